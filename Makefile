@@ -1,0 +1,69 @@
+# Each target does all set-up itself; it needs CPython 3.11 with venv, and nothing else.
+# PYTHON=/path/to/python3.11 chooses the Python, OUTPUT=DIR the folder of the demo's report.
+
+PYTHON ?=
+VENV := .venv
+RUN := $(VENV)/bin
+READY := $(VENV)/.synced
+MANIFESTS := uv.lock pyproject.toml deploy/install_uv.py $(wildcard */pyproject.toml */*/pyproject.toml)
+UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
+
+export OMP_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint bench schemas test-containers clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
+	  while IFS='|' read -r name what; do printf '%-24s %s\n' "$$name" "$$what"; done
+
+setup: $(READY) ## make .venv from the lock file
+
+demo: $(READY) ## teach the demo task, run the whole stack on held-out human motion, write a report
+	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
+
+test: $(READY) ## every test but those in containers; linting, types and imports are among them
+	@$(RUN)/python -m pytest -m "not containers"
+
+lint: $(READY) ## put the code in the house's format and name what is left to mend
+	@$(RUN)/ruff format .
+	@$(RUN)/ruff check --fix .
+	@$(RUN)/python -m pytest -q tests/test_house.py
+
+bench: $(READY) ## measure speed and recognition in full, each against its goal; some ten minutes
+	@PYTHONPATH=tests $(RUN)/python -m bench
+
+schemas: $(READY) ## rewrite the JSON Schemas and golden bytes of all messages
+	@$(RUN)/python -m hmcs.bus.schemas tests/contract
+
+test-containers: $(READY) ## build the images and run the stack in a Docker engine
+	@$(RUN)/python -m pytest -m containers tests/containers
+
+clean: ## remove .venv, reports and caches
+	rm -rf $(VENV) out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# An environment of another Python, or moved from another folder, is made anew.
+$(READY): $(MANIFESTS)
+	@set -e; \
+	is_311() { "$$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1; }; \
+	if ! is_311 $(RUN)/python; then \
+	  python=; \
+	  for candidate in $(if $(PYTHON),"$(PYTHON)",python3.11 python3 python); do \
+	    if is_311 "$$candidate"; then python=$$candidate; break; fi; \
+	  done; \
+	  if [ -z "$$python" ]; then \
+	    echo "HMCS needs CPython 3.11 and found $(if $(PYTHON),another at $(PYTHON),none): install it, or name it: make PYTHON=/path/to/python3.11" >&2; \
+	    exit 1; \
+	  fi; \
+	  rm -rf $(VENV); \
+	  if ! "$$python" -m venv $(VENV); then \
+	    rm -rf $(VENV); \
+	    echo "$$python cannot make an environment: install its venv module (Debian: apt install python3.11-venv)" >&2; \
+	    exit 1; \
+	  fi; \
+	fi; \
+	$(RUN)/python -m pip --version >/dev/null 2>&1 || $(RUN)/python -m ensurepip >/dev/null; \
+	$(RUN)/python deploy/install_uv.py; \
+	$(UV) sync --frozen --quiet --python $(RUN)/python; \
+	touch $@

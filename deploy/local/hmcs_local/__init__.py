@@ -1,0 +1,1 @@
+"""The `hmcs` command: the stack of compose.yaml as processes on this machine."""

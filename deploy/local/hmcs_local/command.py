@@ -1,0 +1,242 @@
+"""The `hmcs` command: arguments in, one call, exit code out."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from hmcs.bus.config import DEFAULT_ROUTER
+from hmcs.errors import UserError
+from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+
+USER_MISTAKE = 2
+
+app = typer.Typer(
+    help="HMCS: recognizes what an operator's hand is about to do, and lends it a ruler.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+task_app = typer.Typer(help="Work with task files.", no_args_is_help=True)
+app.add_typer(task_app, name="task")
+
+_Router = Annotated[
+    str, typer.Option(envvar="HMCS_ROUTER", metavar="ENDPOINT", help="Where the router is.")
+]
+_Cell = Annotated[
+    str, typer.Option(envvar="HMCS_CELL", metavar="NAME", help="Which operator and robot.")
+]
+_Folder = Annotated[
+    Path, typer.Option(metavar="DIR", help="Where `hmcs up` keeps logs, models and recordings.")
+]
+
+
+@app.command()
+def up(
+    services: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,…",
+            help="Start these services only. Without `router` among them, the one at --router "
+            "is joined.",
+        ),
+    ] = "",
+    scale: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SERVICE=N", help="So many instances of a service; may be repeated."),
+    ] = None,
+    router: Annotated[
+        str,
+        typer.Option(
+            metavar="ENDPOINT", help="Where the embedded router listens; port 0: any free one."
+        ),
+    ] = DEFAULT_ROUTER,
+    compose: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The stack; compose.yaml by default.")
+    ] = None,
+    folder: _Folder = DEFAULT_FOLDER,
+) -> None:
+    """Run the stack of compose.yaml as processes here, with the router embedded.
+
+    Ctrl-C ends them all. `${NAME}` in compose.yaml is taken from the environment.
+    """
+    from hmcs_local.launcher import run_up
+
+    chosen = tuple(name.strip() for name in services.split(",") if name.strip())
+    console = Console(highlight=False, soft_wrap=True)
+    code = run_up(
+        lambda while_waiting: LocalStack(
+            compose,
+            services=chosen or None,
+            scale=dict(_scale(item) for item in scale or []),
+            router=router,
+            folder=folder,
+            while_waiting=while_waiting,
+        ),
+        lambda who, what: console.print(_line(who, what)),
+    )
+    raise typer.Exit(code)
+
+
+@app.command()
+def status(
+    once: Annotated[bool, typer.Option("--once", help="Show it once and end.")] = False,
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+) -> None:
+    """Show who is there, how each is, rates, losses and the active model.
+
+    With --once, the exit code is 0 when somebody is there and everybody is healthy, else 1.
+    """
+    from hmcs_local.observer import open_observer
+    from hmcs_local.status import show_status
+
+    with open_observer(router, cell) as bus:
+        well = show_status(bus, Console(), once=once)
+    raise typer.Exit(0 if well else 1)
+
+
+@app.command()
+def swap(
+    instance: Annotated[
+        str | None,
+        typer.Argument(help="The gesteme classifier to replace, as `hmcs status` names it."),
+    ] = None,
+    command: Annotated[
+        str,
+        typer.Option("--with", metavar="COMMAND", help="What to start in its place."),
+    ] = "",
+    activate: Annotated[
+        str, typer.Option(metavar="MODEL", help="The recognizer the fixture is to follow.")
+    ] = "",
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+    folder: _Folder = DEFAULT_FOLDER,
+) -> None:
+    """Replace a classifier, or activate another recognizer, while the stack runs.
+
+    `hmcs swap gesteme-classifier-1` starts a fresh classifier (another program with --with), waits
+    until it has replayed the last steps and is ready, and only then stops the old one: no step
+    goes without evidence. If the newcomer is not ready within 10 s, it is stopped and the old one
+    goes on. Both belong to the `hmcs up` of --folder.
+
+    `hmcs swap --activate MODEL` lets the fixture follow the belief of another recognizer that runs
+    already, in the shadow of the active one.
+    """
+    from hmcs_local import swap as swapping
+    from hmcs_local.control import Control
+    from hmcs_local.observer import open_observer
+
+    if bool(instance) == bool(activate) or (command and not instance):
+        raise UserError("name either a classifier to replace or a model to --activate")
+    with open_observer(router, cell) as bus:
+        if instance:
+            swapping.replace_classifier(
+                bus, Control(folder), instance, command=shlex.split(command), tell=typer.echo
+            )
+        else:
+            typer.echo(swapping.activate(bus, activate))
+
+
+@app.command()
+def router(
+    listen: Annotated[
+        str, typer.Option(metavar="ENDPOINT", help="Where it listens.")
+    ] = DEFAULT_ROUTER,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A Zenoh json5 file, for TLS, access, …")
+    ] = None,
+) -> None:
+    """Run a router alone, until Ctrl-C."""
+    from hmcs.bus.router import main as run_router
+
+    raise typer.Exit(
+        run_router(["--listen", listen, *(["--config", str(config)] if config else [])])
+    )
+
+
+@app.command()
+def train(
+    task: Annotated[str, typer.Argument(help="A shipped task's name or a task file.")],
+    demonstrations: Annotated[
+        list[str], typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER, lasa:SHAPE/FIRST-LAST.")
+    ],
+    output: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
+    name: Annotated[
+        str | None, typer.Option(help="The model's name on the bus; the task's by default.")
+    ] = None,
+) -> None:
+    """Learn a model of a task from demonstrations."""
+    from hmcs_trainer.training import train as learn
+
+    model = learn(task, demonstrations, output, name=name, progress=typer.echo)
+    typer.echo(f"{output}: model {model.name}")
+
+
+@task_app.command()
+def check(
+    file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],
+) -> None:
+    """Name every problem of a task file, with line and field; exit code 2 where there is one."""
+    from hmcs.task import load_task
+
+    task = load_task(file)
+    typer.echo(f"{file}: in order: {len(task.gestemes)} gestemes, {len(task.states)} states")
+
+
+@app.command()
+def demo(
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="The folder the report is written to.")
+    ] = Path("out/demo"),
+    seed: Annotated[int, typer.Option(help="Chooses which classifier is killed, and when.")] = 1,
+    held_out: Annotated[
+        str, typer.Option(metavar="N,N", help="The demonstrations played, and not learned from.")
+    ] = "6,7",
+) -> None:
+    """Run the whole stack on held-out human motion, swap a classifier, write a report."""
+    numbers = _numbers(held_out)
+    from hmcs_local.demo import run_demo
+
+    raise typer.Exit(run_demo(output=output, seed=seed, held_out=numbers))
+
+
+def main() -> None:
+    """Run the command; a mistake of the user is one message and exit code 2, never a traceback."""
+    try:
+        app()
+    except UserError as error:
+        sys.stderr.write(f"hmcs: {error}\n")
+        sys.exit(USER_MISTAKE)
+
+
+def _scale(item: str) -> tuple[str, int]:
+    name, _, count = item.partition("=")
+    if not count.isdecimal():
+        raise UserError(f"--scale {item}: write SERVICE=N, e.g. gesteme-classifier=3")
+    return name, int(count)
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    if not all(part.strip().isdecimal() for part in text.split(",")):
+        raise UserError(f"--held-out {text}: write numbers with commas between them, e.g. 6,7")
+    return tuple(int(part) for part in text.split(","))
+
+
+_STYLES = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green")
+
+
+def _line(who: str, what: str) -> Text:
+    style = "bold" if who == "hmcs" else _STYLES[sum(who.encode()) % len(_STYLES)]
+    head = f"{who:22} | "
+    return Text.assemble((head, style), what.replace("\n", f"\n{'':22} | "))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""`hmcs swap`: another recognizer, or a fresh classifier, while the stack runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from hmcs.bus.keys import ANY, KeyNameError, check_name
+from hmcs.bus.messages import ActivateRecognizer, Done
+from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.errors import UserError
+from hmcs_local.control import Control
+
+CLASSIFIER = "gesteme_classifier"
+"""The only service that may run twice at a time without harm, so that one can take over."""
+
+_LOOK_EVERY_S = 0.05
+
+
+class SwapError(UserError):
+    """A swap that was not made; what ran before runs on."""
+
+
+def activate(bus: Bus, model: str) -> str:
+    """Let the fixture follow the belief of recognizer `model`; returns what the fixture answers.
+
+    Raises SwapError where no fixture controller is there, or where it refuses.
+    """
+    try:
+        check_name("model", model)
+    except KeyNameError as error:
+        raise SwapError(str(error)) from None
+    keys = bus.keys
+    present = [keys.member_of(key) for key in bus.alive(keys.presence("fixture_controller"))]
+    if not present:
+        raise SwapError(
+            f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
+        )
+    details = []
+    for member in present:
+        key = keys.rpc(member.service, member.instance, "activate")
+        try:
+            answers = bus.ask(key, ActivateRecognizer(model=model), Done)
+        except RequestRefusedError as error:
+            raise SwapError(f"{member.instance}: {error}") from None
+        if not answers:
+            raise SwapError(f"{member.instance} does not answer: see `hmcs status`")
+        details += [answer.body.detail for answer in answers]
+    return "; ".join(details)
+
+
+def replace_classifier(
+    bus: Bus,
+    control: Control,
+    instance: str,
+    *,
+    command: Sequence[str] | None = None,
+    ready_within_s: float = 10.0,
+    tell: Callable[[str], None] = lambda _: None,
+) -> str:
+    """Start a fresh classifier, wait until it has replayed and is ready, stop `instance`.
+
+    The newcomer is ready when its member token is there; until then the old one goes on, and if
+    the newcomer is not ready in time it is stopped instead. Returns the newcomer's name.
+    Raises SwapError where there is no such classifier or the newcomer is not ready in time, and
+    ControlError where no `hmcs up` works in the folder of `control`.
+    """
+    members = _members(bus)
+    if instance not in members:
+        raise SwapError(
+            f"no classifier {instance!r} at work in cell {bus.settings.cell}: "
+            f"choose from {', '.join(sorted(members)) or 'none'}"
+        )
+    if not control.owns(instance):
+        raise SwapError(
+            f"{instance} was not started by the `hmcs up` of this folder: start its replacement "
+            "where it belongs, wait until `hmcs status` shows it, then stop the old one"
+        )
+    newcomer = control.start("gesteme-classifier", command)
+    tell(f"{newcomer} started; {instance} goes on until it is ready")
+    deadline_s = time.monotonic() + ready_within_s
+    while newcomer not in _members(bus):
+        if time.monotonic() > deadline_s or not control.owns(newcomer):
+            control.stop(newcomer)
+            raise SwapError(
+                f"{newcomer} was not ready within {ready_within_s:g} s and was stopped; "
+                f"{instance} goes on. Its log says why: {newcomer}.log"
+            )
+        bus.pump(_LOOK_EVERY_S)
+    tell(f"{newcomer} has replayed and is ready")
+    code = control.stop(instance)
+    tell(f"{instance} stopped with exit code {code}")
+    return newcomer
+
+
+def _members(bus: Bus) -> set[str]:
+    keys = bus.keys
+    return {keys.member_of(key).instance for key in bus.alive(keys.member(ANY, CLASSIFIER))}

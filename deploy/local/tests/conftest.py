@@ -1,0 +1,112 @@
+"""A small stack of fake services, described as the real one is."""
+
+from __future__ import annotations
+
+import textwrap
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+import yaml
+
+from hmcs_local.control import ControlServer
+from hmcs_local.stack import LocalStack
+
+FAKE_CLASSIFIER = textwrap.dedent(
+    """
+    import os, signal, threading
+    from hmcs.bus.config import BusSettings
+    from hmcs.bus.session import Bus
+
+    stop = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    instance = os.environ["HMCS_INSTANCE"]
+    settings = BusSettings(router=os.environ["HMCS_ROUTER"], cell=os.environ["HMCS_CELL"])
+    with Bus.open(settings, "gesteme_classifier", instance) as bus:
+        bus.announce(bus.keys.presence("gesteme_classifier", instance))
+        bus.announce(bus.keys.member("fake", "gesteme_classifier", instance))
+        print("ready", flush=True)
+        stop.wait()
+    """
+)
+SLEEPER = "import time; print('sleeping', flush=True); time.sleep(600)"
+
+
+def python(script: str) -> list[str]:
+    return ["python", "-c", script]
+
+
+@pytest.fixture
+def write_compose(tmp_path: Path) -> Callable[..., Path]:
+    """Write a compose file with a router and the given services; returns its path."""
+
+    def write(**services: dict[str, Any]) -> Path:
+        path = tmp_path / "compose.yaml"
+        named = {name.replace("_", "-"): service for name, service in services.items()}
+        document = {"services": {"router": {"image": "any"}, **named}}
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def service() -> Callable[..., dict[str, Any]]:
+    """Describe a service as compose.yaml does; it sleeps unless a script is given."""
+
+    def describe(script: str = SLEEPER, **more: Any) -> dict[str, Any]:
+        return {"command": python(script), "stop_grace_period": "2s", **more}
+
+    return describe
+
+
+@pytest.fixture
+def classifier(service: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+    """A fake gesteme classifier: on the bus, ready at once, publishing nothing."""
+    environment = {"HMCS_ROUTER": "tcp/router:7447", "HMCS_CELL": "fake"}
+    return service(FAKE_CLASSIFIER, environment=environment)
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], Any]], Any]:
+    """Wait until a condition holds; fails after 10 s. Returns what the condition returned."""
+
+    def wait(condition: Callable[[], Any], within_s: float = 10.0) -> Any:
+        deadline_s = time.monotonic() + within_s
+        while not (value := condition()):
+            assert time.monotonic() < deadline_s, "did not come about in time"
+            time.sleep(0.01)
+        return value
+
+    return wait
+
+
+@pytest.fixture
+def served() -> Callable[[LocalStack, Callable[[], Any]], Any]:
+    """Do what another command would do, while the stack's launcher answers it here."""
+
+    def serve(stack: LocalStack, command: Callable[[], Any]) -> Any:
+        with ControlServer(stack) as server, ThreadPoolExecutor(1) as other:
+            result = other.submit(command)
+            while not result.done():
+                server.serve(0.02)
+        return result.result()
+
+    return serve
+
+
+@pytest.fixture
+def is_gone() -> Callable[[int], bool]:
+    """Tell whether a process is no more, or only waits to be reaped."""
+
+    def gone(pid: int) -> bool:
+        try:
+            return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
+        except psutil.NoSuchProcess:
+            return True
+
+    return gone

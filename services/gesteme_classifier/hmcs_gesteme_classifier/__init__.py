@@ -1,0 +1,1 @@
+"""Scores gestemes for every living segment start: one of several classifiers in parallel."""

@@ -1,0 +1,146 @@
+"""The service: steps in, one call into the gesteme models, evidence out."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+
+import numpy as np
+
+from hmcs.bus.messages import Evidence
+from hmcs.bus.service import Service, UserError
+from hmcs.bus.session import Bus
+from hmcs.bus.step_feed import FedStep, StepFeed
+from hmcs.recognition.gestemes import GestemeBank, StepEvidence
+from hmcs.recognition.model_file import load_model
+from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
+from hmcs_gesteme_classifier.shares import share_of
+
+HANDOVER_NS = 500_000_000
+"""How long a gesteme is held on after a peer has taken it over: what is gained is gained at once,
+what is lost only when the other has surely found its pace. Duplicates cost the task nothing."""
+
+
+class GestemeClassifier(Service):
+    """Publishes evidence for the gestemes it holds, a pure function of the last steps."""
+
+    name = "gesteme_classifier"
+    Settings = GestemeClassifierSettings
+
+    def __init__(self, settings: GestemeClassifierSettings, bus: Bus, log: logging.Logger) -> None:
+        super().__init__(settings, bus, log)
+        self._model = load_model(settings.model)
+        self._named = _named(settings.gestemes, self._model.gesteme_names, settings.model)
+        self._dtype = np.dtype(settings.precision)
+        self._evidence = bus.publisher(
+            Evidence, bus.keys.evidence(self._model.name, bus.source.instance)
+        )
+        self._peers_key = bus.keys.member(self._model.name, self.name)
+        self._peers = {bus.source.instance}
+        self._bank = self._model.bank([])
+        self._recent: deque[FedStep] = deque(maxlen=self._model.scoring.window_steps)
+        self._ready = False
+        self._feed = StepFeed(
+            bus,
+            log,
+            self._on_step,
+            self._on_restart,
+            memory_steps=self._model.scoring.window_steps,
+        )
+
+    def start(self) -> None:
+        """Take a share, replay the last steps, and only then be counted on by the others."""
+        if self._named:
+            self._hold(self._named)
+            self._feed.begin()
+        else:
+            for key in self.bus.alive(self._peers_key):
+                self._peers.add(self.bus.keys.member_of(key).instance)
+            self._hold(self._share())
+            self._feed.begin()
+            self.bus.announce(
+                self.bus.keys.member(self._model.name, self.name, self.bus.source.instance)
+            )
+            self.bus.watch(self._peers_key, self._on_peer)
+        self._ready = True
+
+    def health(self) -> tuple[bool, str]:
+        """Healthy always: a classifier that waits for steps does what it is for."""
+        steps = self._recent[-1].step.index if self._recent else "none yet"
+        return True, f"{len(self._bank.held)} gestemes of {self._model.name}, last step {steps}"
+
+    def facts(self) -> dict[str, str]:
+        """Return the model and the gestemes held."""
+        names = self._model.gesteme_names
+        return {
+            "model": self._model.name,
+            "model_hash": self._model.hash,
+            "gestemes": ", ".join(names[g] for g in self._bank.held),
+        }
+
+    def _on_step(self, fed: FedStep) -> None:
+        self._recent.append(fed)
+        evidence = self._score(self._bank, fed)
+        if self._ready:
+            self._evidence.put(self._message(evidence, fed.clock), fed.origin)
+
+    def _on_restart(self, index: int) -> None:
+        self._recent.clear()
+        self._bank = self._model.bank(self._bank.held)
+        self.log.info("beginning anew", extra={"step": index})
+
+    def _on_peer(self, key: str, alive: bool) -> None:
+        peer = self.bus.keys.member_of(key).instance
+        if peer != self.bus.source.instance:
+            (self._peers.add if alive else self._peers.discard)(peer)
+            self._hold(self._share() | frozenset(self._bank.held))
+            self.bus.at(time.monotonic_ns() + HANDOVER_NS, self._let_go)
+
+    def _let_go(self) -> None:
+        self._hold(self._share())
+
+    def _share(self) -> frozenset[int]:
+        return share_of(
+            self.bus.source.instance,
+            self._peers,
+            self._model.gesteme_names,
+            self.settings.redundancy,
+        )
+
+    def _hold(self, wanted: frozenset[int]) -> None:
+        """Hold `wanted`; only the gestemes gained are replayed."""
+        held = frozenset(self._bank.held)
+        if wanted == held:
+            return
+        fresh = self._model.bank(sorted(wanted - held))
+        for fed in self._recent:
+            self._score(fresh, fed)
+        self._bank = self._bank.replaced(fresh, sorted(held & wanted))
+        self.log.info("gestemes held", extra=self.facts() | {"peers": len(self._peers)})
+
+    def _score(self, bank: GestemeBank, fed: FedStep) -> StepEvidence:
+        step = fed.step
+        return bank.step(step.index, step.position, step.displacement)
+
+    def _message(self, evidence: StepEvidence, clock: str) -> Evidence:
+        names = self._model.gesteme_names
+        return Evidence(
+            model_hash=self._model.hash,
+            clock=clock,
+            step=evidence.step,
+            gestemes=tuple(names[g] for g in evidence.gestemes),
+            pair_gesteme=np.searchsorted(evidence.gestemes, evidence.pair_gesteme).astype(np.int32),
+            pair_start=evidence.pair_start,
+            exit=evidence.exit.astype(self._dtype),
+            log_ratio=evidence.log_ratio.astype(self._dtype),
+        )
+
+
+def _named(wanted: tuple[str, ...], known: tuple[str, ...], model: object) -> frozenset[int]:
+    strangers = [name for name in wanted if name not in known]
+    if strangers:
+        raise UserError(
+            f"gestemes {', '.join(strangers)} are not in model {model}: it has {', '.join(known)}"
+        )
+    return frozenset(known.index(name) for name in wanted)

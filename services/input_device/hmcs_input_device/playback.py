@@ -1,0 +1,100 @@
+"""A demonstration, played as if a hand moved the device."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.motion.demonstrations import Demonstration
+from hmcs_input_device.sources import LIVE, DeviceSample
+
+FloatArray = NDArray[np.float64]
+
+LEAST_RATE_HZ = 30.0
+MOST_RATE_HZ = 1000.0
+
+
+class Passes(NamedTuple):
+    """How a demonstration is played."""
+
+    speed: float = 1.0
+    """How many times as fast as it was made."""
+    repeat: int = 1
+    """How many passes; 0 for ever."""
+    lead_in_s: float = 1.0
+    """How long the hand rests with the dead-man released before each pass."""
+    velocity_window_s: float = 0.02
+    """Velocities are differences over so much time before and after."""
+
+
+class Playback:
+    """Plays a demonstration: the dead-man is held while it moves, and released around that.
+
+    A pass is the lead-in, at rest where the motion begins, and the motion. Before it plays, and
+    when it has played, the device is at rest with the dead-man released.
+    """
+
+    def __init__(self, demonstration: Demonstration, passes: Passes) -> None:
+        time_s = (demonstration.time_s - demonstration.time_s[0]) / passes.speed
+        self._times_s: list[float] = time_s.tolist()
+        self._positions = demonstration.positions
+        self._passes = passes
+        own_hz = 1.0 / float(np.median(np.diff(time_s)))
+        self._rate_hz = min(max(own_hz, LEAST_RATE_HZ), MOST_RATE_HZ)
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second: as many as the demonstration has, within what a device has."""
+        return self._rate_hz
+
+    @property
+    def pass_s(self) -> float:
+        """How long a pass takes, with its lead-in."""
+        return self._passes.lead_in_s + self._times_s[-1]
+
+    @property
+    def duration_s(self) -> float:
+        """How long all passes take; LIVE where they do not end."""
+        return self.pass_s * self._passes.repeat if self._passes.repeat else LIVE
+
+    @property
+    def reach_m(self) -> float:
+        """How far the motion goes from where it begins."""
+        return float(np.linalg.norm(self._positions - self._positions[0], axis=1).max())
+
+    def sample(self, elapsed_s: float | None) -> DeviceSample:
+        """Return the device `elapsed_s` after it was told to play."""
+        if elapsed_s is None or elapsed_s < 0:
+            return self._at_rest(0)
+        if elapsed_s > self.duration_s:
+            return self._at_rest(-1)
+        # The last pass ends on its own last sample, not on the first one of another.
+        done = int(elapsed_s / self.pass_s)
+        if self._passes.repeat:
+            done = min(done, self._passes.repeat - 1)
+        moving_s = elapsed_s - done * self.pass_s - self._passes.lead_in_s
+        if moving_s < 0:
+            return self._at_rest(0)
+        return DeviceSample(self._position(moving_s), self._velocity(moving_s), dead_man=True)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _at_rest(self, index: int) -> DeviceSample:
+        return DeviceSample(self._positions[index], np.zeros(3), dead_man=False)
+
+    def _position(self, moving_s: float) -> FloatArray:
+        behind = min(bisect_right(self._times_s, moving_s), len(self._times_s) - 1) - 1
+        begin_s, end_s = self._times_s[behind : behind + 2]
+        share = min((moving_s - begin_s) / (end_s - begin_s), 1.0)
+        before, after = self._positions[behind], self._positions[behind + 1]
+        return np.asarray((1.0 - share) * before + share * after)
+
+    def _velocity(self, moving_s: float) -> FloatArray:
+        window_s = self._passes.velocity_window_s
+        before_s = max(moving_s - window_s, 0.0)
+        after_s = min(moving_s + window_s, self._times_s[-1])
+        return (self._position(after_s) - self._position(before_s)) / (after_s - before_s)

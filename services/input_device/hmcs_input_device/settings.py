@@ -1,0 +1,68 @@
+"""What the input device can be told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from hmcs.bus.settings import ServiceSettings
+
+
+class InputDeviceSettings(ServiceSettings):
+    """Settings of the input device: where the operator's motion comes from, and when."""
+
+    task: str = "human-shapes"
+    """Name of a task that comes along, or path of a task file."""
+    source: str = "synthetic"
+    """`recorded`, `synthetic`, or the name of a device that another distribution adds."""
+    dead_zone_m: float | None = Field(default=None, gt=0, le=0.2)
+    """δ: the shortest motion that counts as a step; the task's by default."""
+    steps_kept: int = Field(default=4096, ge=2000, le=10_000)
+    """How many steps can be asked for again."""
+
+    rate_hz: float | None = Field(default=None, ge=30.0, le=1000.0)
+    """Samples a second; by default the recording's own rate, 100 Hz for a simulated operator."""
+    autoplay: bool = True
+    """Play as soon as everybody in `wait_for` is there; otherwise only when asked to `play`."""
+    wait_for: tuple[str, ...] = ()
+    """Services that must be present before it plays; one named twice must be there twice."""
+    lead_in_s: float = Field(default=1.0, ge=0.1)
+    """How long the hand rests with the dead-man released before each pass; long enough to be
+    seen."""
+    repeat: int = Field(default=1, ge=0)
+    """How many passes; 0 for ever."""
+    speed: float = Field(default=1.0, gt=0.0, le=100.0)
+    """How many times as fast as recorded."""
+    velocity_window_s: float = Field(default=0.02, gt=0.0, le=1.0)
+    """Velocities are differences over so much time before and after."""
+    re_engage: bool = False
+    """The operator of a recording who sees the robot stand lets go of the dead-man, waits, and
+    presses again; the recording waits meanwhile. Of `recorded` and `synthetic` only."""
+    reaction_s: float = Field(default=0.2, ge=0.0, le=10.0)
+    """How long that operator sees the robot stand before letting go; the delay of eye and hand."""
+
+    demonstration: Path | None = None
+    """CSV file: what `recorded` plays, and what the operator of `synthetic` means to do."""
+    model: Path | None = None
+    """Model file whose learned paths the operator of `synthetic` means to follow."""
+    seed: int = Field(default=0, ge=0)
+    """Of the simulated operator."""
+    segments: int = Field(default=10, ge=1, le=10_000)
+    """How many gestemes the simulated operator performs at most."""
+    noise: float = Field(default=0.05, ge=0.0, le=0.7)
+    """κ of (3.3)."""
+    step_m: float = Field(default=0.01, gt=0.0)
+    """Mean step of the simulated operator."""
+    look_ahead_m: float = Field(default=0.03, gt=0.0)
+    """How far ahead the simulated operator aims."""
+    operator_speed_m_s: float = Field(default=0.1, gt=0.0)
+    """Of the simulated hand."""
+    primitives: Literal["line", "circle", "mixed"] = "mixed"
+    """What gestemes are made of where neither demonstration nor model says it."""
+    primitive_scale: float = Field(default=0.2, gt=0.0)
+    """Size of those: 1 makes lines 0.5 to 1.5 m long, as in the thesis' study."""
+
+    options: dict[str, Any] = Field(default_factory=dict)
+    """What a device of another distribution is told."""

@@ -1,0 +1,105 @@
+"""Where the operator's motion comes from: one small interface, and the hook for real devices.
+
+A source is asked for a sample at every tick. To add a device, write a distribution with a function
+that makes a `Source` of the settings and the task, and name it in its `pyproject.toml`:
+
+    [project.entry-points."hmcs.input_sources"]
+    my_haptic_arm = "my_package.device:open_device"
+
+Once it is installed beside the input device, `--source my_haptic_arm` chooses it; what it needs to
+know goes into the setting `options`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.errors import UserError
+from hmcs.task import Task
+from hmcs_input_device.settings import InputDeviceSettings
+
+FloatArray = NDArray[np.float64]
+
+ENTRY_POINTS = "hmcs.input_sources"
+"""Group of the entry points that name sources."""
+LIVE = math.inf
+"""Duration of a source that has no end."""
+
+
+class DeviceSample(NamedTuple):
+    """The operator's device at one moment; positions in the operator frame, see `Motion`."""
+
+    position: FloatArray
+    """m, shape (3,)."""
+    velocity: FloatArray
+    """m/s, shape (3,)."""
+    dead_man: bool
+    clutch: bool = False
+    pedal: bool = False
+    orientation: FloatArray | None = None
+    """x y z w, shape (4,)."""
+    angular_velocity: FloatArray | None = None
+    """rad/s, shape (3,)."""
+    wrench: FloatArray | None = None
+    """N and N·m, shape (6,)."""
+
+
+class Source(Protocol):
+    """A device, or something that plays one."""
+
+    @property
+    def rate_hz(self) -> float:
+        """How often it wants to be asked."""
+
+    @property
+    def duration_s(self) -> float:
+        """How long it plays; LIVE for a device that is moved by a hand here and now."""
+
+    @property
+    def reach_m(self) -> float | None:
+        """How far its motion goes from where it begins; None where nobody can know."""
+
+    def sample(self, elapsed_s: float | None) -> DeviceSample | None:
+        """Return the device as it is now; None where it has nothing to say.
+
+        `elapsed_s` counts from the moment it was told to play; None before. It must not wait.
+        """
+
+    def close(self) -> None:
+        """Let go of the device."""
+
+
+SourceFactory = Callable[[InputDeviceSettings, Task], Source]
+"""Makes a source; raises UserError where the settings do not let it."""
+
+
+def open_source(
+    settings: InputDeviceSettings, task: Task, built_in: Mapping[str, SourceFactory]
+) -> Source:
+    """Return the source that the settings name, built in or of another distribution.
+
+    Raises UserError where there is none of that name, it cannot be loaded, or refuses its settings.
+    """
+    if settings.source in built_in:
+        return built_in[settings.source](settings, task)
+    others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    if settings.source not in others:
+        raise UserError(
+            f"source: no input source {settings.source!r} (choose of: "
+            f"{', '.join(sorted({*built_in, *others}))}; a distribution adds one with an entry "
+            f"point in the group {ENTRY_POINTS})"
+        )
+    try:
+        factory: SourceFactory = others[settings.source].load()
+    except (ImportError, AttributeError) as error:
+        raise UserError(
+            f"source: {settings.source} = {others[settings.source].value!r} cannot be loaded: "
+            f"{error}: mend or remove the distribution that adds it"
+        ) from error
+    return factory(settings, task)

@@ -1,0 +1,300 @@
+"""The service over a real router, pumped by the test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hmcs.bus.messages import Ask, Done, LastSteps, LastStepsQuestion, Motion, RobotState
+from hmcs.bus.service import run
+from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.motion.demonstrations import Demonstration, write_csv
+from hmcs.motion.steps import steps_of
+from hmcs_input_device import service as service_module
+from hmcs_input_device.service import InputDevice
+from hmcs_input_device.sources import LIVE, DeviceSample
+
+MakeDesk = Callable[..., Any]
+
+
+@pytest.fixture
+def play(make_desk: MakeDesk, line_file: Path) -> MakeDesk:
+    """Bring up an input device that plays the line."""
+    settings = {
+        "source": "recorded",
+        "demonstration": line_file,
+        "lead_in_s": 0.2,
+        "rate_hz": 100.0,
+        "dead_zone_m": 0.02,
+    }
+    return lambda **changes: make_desk(**(settings | changes))
+
+
+def test_every_sample_is_published_and_is_its_own_origin(play: MakeDesk) -> None:
+    desk = play()
+    desk.until_finished()
+    for received in desk.motions:
+        envelope = received.envelope
+        assert envelope.origin is not None
+        assert (envelope.origin.boot, envelope.origin.seq) == (envelope.source.boot, envelope.seq)
+    captured = [received.envelope.origin.captured_ns for received in desk.motions]
+    assert captured == sorted(captured)
+    held = [received.body.dead_man for received in desk.motions]
+    assert not held[0]
+    assert not held[-1]
+    assert any(held)
+
+
+def test_steps_are_those_of_the_recording_and_name_the_sample_that_completed_them(
+    play: MakeDesk, line: Demonstration
+) -> None:
+    desk = play()
+    desk.until_finished()
+    expected = steps_of(line.positions, 0.02)
+    # A busy machine may skip a tick, and a step is then one sample longer.
+    assert len(desk.steps) == pytest.approx(len(expected), abs=1)
+    assert [received.body.index for received in desk.steps] == list(range(len(desk.steps)))
+    sampled = {received.envelope.seq: received.body for received in desk.motions}
+    for received in desk.steps:
+        step, origin = received.body, received.envelope.origin
+        assert np.linalg.norm(step.displacement) >= 0.02
+        if origin.seq in sampled:
+            np.testing.assert_allclose(
+                step.position + step.displacement, sampled[origin.seq].position, atol=1e-12
+            )
+
+
+def test_the_last_steps_are_told_again_with_their_origins(play: MakeDesk) -> None:
+    desk = play()
+    desk.until_finished()
+    clock = desk.bus.source.boot
+    told = desk.ask("last_steps", LastStepsQuestion(count=10_000), LastSteps)
+    assert told.clock == clock
+    assert [step.index for step in told.steps] == [r.body.index for r in desk.steps]
+    assert list(told.origins) == [r.envelope.origin for r in desk.steps]
+    for question, indices in (
+        (LastStepsQuestion(count=3), slice(-3, None)),
+        (LastStepsQuestion(count=2, before=5), slice(3, 5)),
+        (LastStepsQuestion(count=10, before=2), slice(0, 2)),
+        (LastStepsQuestion(count=10, before=0), slice(0, 0)),
+        (LastStepsQuestion(count=2, before=10**6), slice(-2, None)),
+    ):
+        told = desk.ask("last_steps", question, LastSteps)
+        expected = list(range(len(desk.steps)))[indices]
+        assert [step.index for step in told.steps] == expected
+
+
+def test_it_rests_until_it_is_told_to_play_and_plays_as_often_as_told(play: MakeDesk) -> None:
+    desk = play(autoplay=False)
+    desk.until(lambda: len(desk.motions) > 20, "samples at rest")
+    assert not any(received.body.dead_man for received in desk.motions)
+    assert desk.service.health() == (True, "waiting to be told to play")
+    assert isinstance(desk.ask("play", Ask(), Done), Done)
+    desk.until_finished()
+    once = len(desk.steps)
+    assert once > 5
+    assert desk.service.facts()["remaining_s"] == "0.00"
+    desk.ask("play", Ask(), Done)
+    desk.until_finished()
+    indices = [received.body.index for received in desk.steps]
+    assert indices == list(range(len(desk.steps)))
+    assert len(indices) >= 2 * once - 2
+    assert max(np.linalg.norm(r.body.displacement) for r in desk.steps) < 0.1
+
+
+def test_it_waits_for_those_it_is_told_to_wait_for(play: MakeDesk) -> None:
+    desk = play(wait_for=("robot", "robot", "task_hmm"))
+    assert desk.service.health() == (True, "waiting for robot, robot, task_hmm")
+    refused = desk.ask("play", Ask(), Done)
+    assert isinstance(refused, RequestRefusedError)
+    assert "robot" in str(refused)
+    keys = desk.listener.keys
+    desk.listener.announce(keys.presence("robot", "a"))
+    desk.listener.announce(keys.presence("task_hmm", "a"))
+    desk.until(lambda: desk.service.health()[1] == "waiting for robot", "two of three")
+    desk.listener.announce(keys.presence("robot", "b"))
+    desk.until(lambda: desk.service.health()[1] == "playing", "the third")
+    desk.until(lambda: desk.steps, "steps")
+
+
+def test_a_dead_zone_larger_than_the_motion_makes_a_simulated_device_unhealthy(
+    make_desk: MakeDesk, caplog: pytest.LogCaptureFixture
+) -> None:
+    desk = make_desk(primitive_scale=0.02, segments=1, dead_zone_m=0.2, step_m=0.001)
+    healthy, detail = desk.service.health()
+    assert not healthy
+    assert "no step possible" in detail
+    assert "no step possible" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--dead-zone-m", "0.2", "--demonstration", "SMALL"], "less than the dead zone of 0.2 m"),
+        (["--demonstration", "none.csv"], "none.csv: cannot be read"),
+        (["--task", "none"], "human-shapes, lines-through-obstacles"),
+        (["--source", "mouse"], "choose of: recorded, synthetic"),
+        (["--rate-hz", "7"], "rate_hz"),
+    ],
+)
+def test_a_mistake_of_the_user_ends_it_with_code_2_and_one_message(
+    router: str,
+    tmp_path: Path,
+    line: Demonstration,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    said: str,
+) -> None:
+    write_csv(tmp_path / "small.csv", line._replace(positions=line.positions / 2))
+    small = [str(tmp_path / "small.csv") if word == "SMALL" else word for word in arguments]
+    assert run(InputDevice, ["--router", router, "--source", "recorded", *small]) == 2
+    message = capsys.readouterr().err.splitlines()[-1]
+    assert message.startswith("input_device: ")
+    assert said in message
+
+
+class Robot:
+    """Follows while the dead-man is held, after a stop only once it was released."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.may_follow = False
+        self.stands = False
+        self._states = bus.publisher(RobotState, bus.keys.robot_state)
+        bus.subscribe(Motion, bus.keys.motion, self._on_motion)
+
+    def stop(self) -> None:
+        self.may_follow = False
+
+    def _on_motion(self, received: Received[Motion]) -> None:
+        self.may_follow = self.may_follow or not received.body.dead_man
+        self.stands = not (self.may_follow and received.body.dead_man)
+        self._states.put(
+            RobotState(
+                robot="fake",
+                joint_positions=np.zeros(6),
+                joint_velocities=np.zeros(6),
+                tool_position=np.zeros(3),
+                tool_orientation=np.array([0.0, 0.0, 0.0, 1.0]),
+                tool_twist=np.zeros(6),
+                reference_twist=np.zeros(6),
+                nearest_obstacle="",
+                nearest_distance_m=None,
+                contacts=(),
+                stop="stale_command" if self.stands else "none",
+                limited=(),
+            )
+        )
+
+
+@pytest.mark.parametrize("re_engage", [True, False])
+def test_operator_of_a_recording_lets_go_and_presses_again_when_the_robot_stands(
+    play: MakeDesk, line: Demonstration, re_engage: bool
+) -> None:
+    desk = play(re_engage=re_engage, lead_in_s=0.5, speed=0.5, autoplay=False)
+    robot = Robot(desk.open_bus("robot"))
+    desk.ask("play", Ask(), Done)
+    desk.until(lambda: len(desk.steps) >= 3, "steps")
+    assert not robot.stands
+    robot.stop()
+    desk.until_finished()
+    held = [received.body.dead_man for received in desk.motions]
+    assert int(np.diff(np.array(held, dtype=int)).clip(0).sum()) == 1 + re_engage
+    assert desk.service.facts()["re_engagements"] == str(int(re_engage))
+    # A tick that a busy machine skips makes a step one sample longer, and no motion is lost.
+    expected = steps_of(line.positions, 0.02)
+    assert len(desk.steps) == pytest.approx(len(expected), abs=1)
+    assert [received.body.index for received in desk.steps] == list(range(len(desk.steps)))
+    sampled = {received.envelope.seq: received.body for received in desk.motions}
+    for received in desk.steps:
+        origin = received.envelope.origin
+        assert received.body.displacement[1] < 0.05
+        if origin.seq in sampled:
+            np.testing.assert_allclose(
+                received.body.position + received.body.displacement,
+                sampled[origin.seq].position,
+                atol=1e-9,
+            )
+
+
+class Hand:
+    """A device that says what it is told to."""
+
+    rate_hz, duration_s, reach_m = 200.0, LIVE, None
+
+    def __init__(self) -> None:
+        self.says: DeviceSample | None = DeviceSample(np.zeros(3), np.zeros(3), dead_man=True)
+        self.closed = False
+
+    def move(self, x_m: float, **fields: Any) -> None:
+        position = np.array([x_m, 0.0, 0.0])
+        self.says = DeviceSample(position, np.zeros(3), **({"dead_man": True} | fields))
+
+    def sample(self, elapsed_s: float | None) -> DeviceSample | None:
+        return self.says
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def hand(monkeypatch: pytest.MonkeyPatch) -> Hand:
+    device = Hand()
+    monkeypatch.setattr(service_module, "BUILT_IN", {"hand": lambda *_: device})
+    return device
+
+
+def test_motion_made_while_clutched_or_released_is_taken_out_of_the_steps(
+    make_desk: MakeDesk, hand: Hand
+) -> None:
+    desk = make_desk(source="hand", dead_zone_m=0.02)
+
+    def let(x_m: float, **fields: Any) -> None:
+        hand.move(x_m, **fields)
+        count = len(desk.motions)
+        desk.until(lambda: len(desk.motions) > count + 3, "the device to be seen")
+
+    let(0.0)
+    let(0.03)
+    let(0.03, clutch=True)
+    let(0.50, clutch=True)
+    let(0.50)
+    let(0.53)
+    let(0.53, dead_man=False)
+    let(0.0, dead_man=False)
+    let(0.0)
+    let(0.03)
+    desk.until(lambda: len(desk.steps) == 3, "three steps")
+    for index, received in enumerate(desk.steps):
+        np.testing.assert_allclose(received.body.position, (0.03 * index, 0, 0), atol=1e-12)
+        np.testing.assert_allclose(received.body.displacement, (0.03, 0, 0), atol=1e-12)
+
+
+def test_a_sample_that_is_none_is_refused_counted_and_nothing_is_lost(
+    make_desk: MakeDesk, hand: Hand
+) -> None:
+    desk = make_desk(source="hand", dead_zone_m=0.02)
+    hand.move(float("nan"))
+    desk.until(lambda: desk.bus.counters.refused["motion"] > 2, "refusals")
+    assert not desk.service.health()[0]
+    hand.move(0.05)
+    desk.until(lambda: desk.steps, "a step")
+    assert desk.steps[0].body.displacement[0] == pytest.approx(0.05)
+    assert desk.service.health() == (True, "playing")
+    assert all(np.isfinite(received.body.position).all() for received in desk.motions)
+    assert desk.listener.counters.lost["motion"] == 0
+
+
+def test_a_device_that_falls_silent_is_unhealthy_and_closed_at_the_end(
+    make_desk: MakeDesk, hand: Hand
+) -> None:
+    desk = make_desk(source="hand")
+    hand.says = None
+    desk.until(lambda: not desk.service.health()[0], "bad health")
+    assert "gives no samples" in desk.service.health()[1]
+    assert isinstance(desk.ask("play", Ask(), Done), RequestRefusedError)
+    desk.service.close()
+    assert hand.closed

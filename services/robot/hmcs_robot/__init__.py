@@ -1,0 +1,1 @@
+"""The robot: a simulated arm that follows velocity commands within its limits."""

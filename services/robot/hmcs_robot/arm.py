@@ -1,0 +1,111 @@
+"""An arm loaded into PyBullet: its joints, its tool frame and its Jacobian.
+
+PyBullet measures the points whose Jacobian it gives in a frame of its own, counts joints that are
+no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pybullet
+
+from hmcs_robot import rotations
+from hmcs_robot.driver import Array, JointLimits, Pose
+from hmcs_robot.robots import RobotModel
+
+
+class Arm:
+    """One arm, fixed at the origin of a PyBullet client."""
+
+    def __init__(self, model: RobotModel, client: int) -> None:
+        self._client = client
+        self.body: int = pybullet.loadURDF(
+            str(model.urdf),
+            useFixedBase=True,
+            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+        )
+        infos = [
+            pybullet.getJointInfo(self.body, index, physicsClientId=client)
+            for index in range(pybullet.getNumJoints(self.body, physicsClientId=client))
+        ]
+        movable = [info for info in infos if info[2] != pybullet.JOINT_FIXED]
+        turning = [info for info in movable if info[2] == pybullet.JOINT_REVOLUTE]
+        self.joints: list[int] = [info[0] for info in turning]
+        self.other_joints: list[int] = [info[0] for info in movable if info not in turning]
+        self.torques: list[float] = [info[10] for info in turning]
+        speeds = model.joint_speed_rad_s or [info[11] for info in turning]
+        self.limits = JointLimits(
+            np.array([info[8] for info in turning]),
+            np.array([info[9] for info in turning]),
+            np.array(speeds, dtype=float),
+        )
+        self._movable = len(movable)
+        self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
+        self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
+        inertial = self._inertial[self._tool_link]
+        in_link = np.array([0.0, 0.0, model.tool_offset_m]) - inertial.position
+        self._tool_from_mass: Array = _matrix(inertial).T @ in_link
+
+    def place(self, joint_positions: Array) -> None:
+        """Put the arm at `joint_positions`, rad, shape (n,), at rest."""
+        for joint, position in zip(self.joints, joint_positions.tolist(), strict=True):
+            pybullet.resetJointState(self.body, joint, position, physicsClientId=self._client)
+
+    def tool(self) -> Pose:
+        """Return the pose of the tool frame where the arm is now."""
+        state = pybullet.getLinkState(
+            self.body, self._tool_link, computeForwardKinematics=True, physicsClientId=self._client
+        )
+        # The link's own frame (4, 5) has the digits of a float32, that of its mass has them all.
+        mass = Pose(np.array(state[0]), np.array(state[1]))
+        back = self._inertial[self._tool_link].orientation * [-1.0, -1.0, -1.0, 1.0]
+        return Pose(
+            mass.position + _matrix(mass) @ self._tool_from_mass,
+            rotations.product(mass.orientation, back),
+        )
+
+    def jacobian(self, joint_positions: Array) -> Array:
+        """Return the Jacobian of the tool frame, base frame, linear part first, shape (6, n)."""
+        return self._jacobian(self._tool_link, self._tool_from_mass, joint_positions)
+
+    def separation_per_joint(
+        self, link: int, point: Array, normal: Array, joint_positions: Array
+    ) -> Array:
+        """Return how `point` of `link`, m, base frame, moves along `normal`, m/rad, shape (n,)."""
+        state = pybullet.getLinkState(
+            self.body, link, computeForwardKinematics=True, physicsClientId=self._client
+        )
+        mass = Pose(np.array(state[0]), np.array(state[1]))
+        from_mass = _matrix(mass).T @ (point - mass.position)
+        speed: Array = normal @ self._jacobian(link, from_mass, joint_positions)[:3]
+        return speed
+
+    def _jacobian(self, link: int, from_mass: Array, joint_positions: Array) -> Array:
+        """Return the Jacobian of a point given in the frame of the link's mass."""
+        inertial = self._inertial[link]
+        # PyBullet counts along the axes of the mass, but from the origin of the link.
+        point = from_mass + _matrix(inertial).T @ inertial.position
+        still = [0.0] * self._movable
+        # The arm's joints come before those of its fingers.
+        positions = joint_positions.tolist() + still[len(self.joints) :]
+        parts = pybullet.calculateJacobian(
+            self.body,
+            link,
+            point.tolist(),
+            positions,
+            still,
+            still,
+            physicsClientId=self._client,
+        )
+        return np.vstack(parts)[:, : len(self.joints)]
+
+
+def _inertial_frame(body: int, link: int, client: int) -> Pose:
+    """Return the frame of a link's mass in the link's own frame."""
+    info = pybullet.getDynamicsInfo(body, link, physicsClientId=client)
+    return Pose(np.array(info[3]), np.array(info[4]))
+
+
+def _matrix(pose: Pose) -> Array:
+    return np.array(pybullet.getMatrixFromQuaternion(pose.orientation.tolist())).reshape(3, 3)

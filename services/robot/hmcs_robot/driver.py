@@ -1,0 +1,95 @@
+"""What the service needs of an arm: the simulation is one driver, a real robot would be another."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Pose(NamedTuple):
+    """A position and an orientation, in the robot's base frame unless said otherwise."""
+
+    position: Array
+    """m, shape (3,)."""
+    orientation: Array
+    """Unit quaternion x y z w, shape (4,)."""
+
+
+class JointLimits(NamedTuple):
+    """What the joints of an arm can do; all of shape (n,)."""
+
+    lower: Array
+    """rad."""
+    upper: Array
+    """rad."""
+    speed: Array
+    """rad/s."""
+
+
+class Nearest(NamedTuple):
+    """The obstacle nearest to the arm."""
+
+    name: str
+    distance_m: float
+    """Negative in penetration."""
+
+
+class Touch(NamedTuple):
+    """A place where the arm touches an obstacle."""
+
+    name: str
+    """Of the obstacle."""
+    separation_per_joint: Array
+    """Derivative of the distance there with respect to the joint positions, m/rad, shape (n,):
+    times the joint velocities it is the speed of parting, negative where the arm presses in."""
+
+
+class ArmState(NamedTuple):
+    """Where an arm is and what is near it, at one instant."""
+
+    joint_positions: Array
+    """rad, shape (n,)."""
+    joint_velocities: Array
+    """rad/s, shape (n,)."""
+    tool: Pose
+    """Of the tool frame."""
+    jacobian: Array
+    """Of the tool frame, base frame, linear part first, shape (6, n)."""
+    nearest: Nearest | None
+    """None where no obstacle is within reach of the search."""
+    touches: tuple[Touch, ...]
+    """Empty while the arm is free."""
+
+    @property
+    def tool_twist(self) -> Array:
+        """Velocity of the tool frame, m/s and rad/s, base frame, shape (6,)."""
+        twist: Array = self.jacobian @ self.joint_velocities
+        return twist
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the obstacles touched, each once, sorted."""
+        return tuple(sorted({touch.name for touch in self.touches}))
+
+
+class ArmDriver(Protocol):
+    """An arm that follows joint velocities."""
+
+    name: str
+    limits: JointLimits
+
+    def read(self) -> ArmState:
+        """Return where the arm is now."""
+        ...
+
+    def move(self, joint_velocities: Array) -> None:
+        """Follow `joint_velocities`, rad/s, shape (n,), for one control period."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the arm."""
+        ...

@@ -1,0 +1,35 @@
+"""What the robot can be told."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from hmcs.bus.settings import ServiceSettings
+
+
+class RobotSettings(ServiceSettings):
+    """Settings of the robot: a simulated arm that follows velocity commands."""
+
+    task: str = "human-shapes"
+    """Name of a task that comes along, or path of a task file: robot, workspace, obstacles."""
+    gui: bool = False
+    """Show the simulation in a window."""
+    physics_rate_hz: float = Field(default=240.0, ge=120.0, le=2000.0)
+    """Control cycles and physics steps a second."""
+    state_rate_hz: float = Field(default=120.0, gt=0.0, le=2000.0)
+    """RobotStates published a second; at most one a control cycle."""
+    damping: float = Field(default=0.02, gt=0.0, le=1.0)
+    """λ of the damped least squares."""
+    correction_per_s: float = Field(default=10.0, ge=0.0, le=50.0)
+    """Rate at which the tool is drawn to where the commands have led."""
+    braking_per_s: float = Field(default=8.0, gt=0.0, le=20.0)
+    """Speed allowed per distance left to a wall of the workspace or the end of a joint's range."""
+    acceleration_limit_m_s2: float = Field(default=10.0, gt=0.0)
+    """Of the tool while it follows; a stop is as fast as the motors can brake."""
+    angular_acceleration_limit_rad_s2: float = Field(default=20.0, gt=0.0)
+    hang_s: float = Field(default=0.1, gt=0.0)
+    """A longer pause between two control cycles is a hang of this process: the arm stops."""
+    settle_s: float = Field(default=0.25, ge=0.0)
+    """How long commands are refused after a hang, while what queued up meanwhile drains."""
+    search_m: float = Field(default=0.2, gt=0.0)
+    """Within this distance the nearest obstacle is looked for."""

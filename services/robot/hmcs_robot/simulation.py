@@ -1,0 +1,190 @@
+"""A simulated arm among the obstacles of a task: one driver, in PyBullet."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pybullet
+
+from hmcs.errors import UserError
+from hmcs.task import Obstacle
+from hmcs_robot.arm import Arm
+from hmcs_robot.driver import ArmState, Array, Nearest, Pose, Touch
+from hmcs_robot.kinematics import inverse_kinematics
+from hmcs_robot.robots import ROBOTS
+
+_GRAVITY_M_S2 = 9.81
+_TOUCHING_M = 0.0005
+"""Nearer than this counts as contact: the solver keeps bodies about so far apart."""
+_BASE_LINK = -1
+
+
+class StartPoseError(UserError):
+    """The robot cannot stand where the task begins."""
+
+
+class Scene(NamedTuple):
+    """What is simulated."""
+
+    robot: str
+    """A name of `ROBOTS`."""
+    start: Pose
+    """Of the tool."""
+    obstacles: tuple[Obstacle, ...]
+
+
+class Simulation:
+    """An arm that is moved by its joints' motors, each with the torque it has.
+
+    One `move` is one step of the physics of `period_s`. The arm and the obstacles collide; the arm
+    does not collide with itself. Raises UnreachablePoseError where the arm cannot reach the start
+    pose, StartPoseError where it touches an obstacle there, UserError where no window opens.
+    """
+
+    def __init__(
+        self, scene: Scene, period_s: float, *, gui: bool = False, reach_m: float = 0.2
+    ) -> None:
+        self.name = scene.robot
+        self.home = start_posture(scene.robot, scene.start)
+        self._reach_m = reach_m
+        self._client = _connect(gui)
+        pybullet.setGravity(0, 0, -_GRAVITY_M_S2, physicsClientId=self._client)
+        pybullet.setTimeStep(period_s, physicsClientId=self._client)
+        self.arm = Arm(ROBOTS[scene.robot], self._client)
+        self.limits = self.arm.limits
+        for link in range(pybullet.getNumJoints(self.arm.body, physicsClientId=self._client)):
+            pybullet.changeDynamics(
+                self.arm.body,
+                link,
+                linearDamping=0,
+                angularDamping=0,
+                jointDamping=0,
+                physicsClientId=self._client,
+            )
+        self._obstacles = {
+            _add(obstacle, self._client): obstacle.name for obstacle in scene.obstacles
+        }
+        self.arm.place(self.home)
+        for joint in self.arm.other_joints:
+            pybullet.setJointMotorControl2(
+                self.arm.body,
+                joint,
+                pybullet.VELOCITY_CONTROL,
+                targetVelocity=0,
+                force=100,
+                physicsClientId=self._client,
+            )
+        touched = self.read().contacts
+        if touched:
+            self.close()
+            raise StartPoseError(
+                f"robot {scene.robot} touches {', '.join(touched)} at the start pose of the task: "
+                "move the obstacle or choose another tool_start_m"
+            )
+
+    def read(self) -> ArmState:
+        """Return where the arm is now."""
+        states = pybullet.getJointStates(
+            self.arm.body, self.arm.joints, physicsClientId=self._client
+        )
+        positions = np.array([state[0] for state in states])
+        nearest, touches = self._look_around(positions)
+        return ArmState(
+            positions,
+            np.array([state[1] for state in states]),
+            self.arm.tool(),
+            self.arm.jacobian(positions),
+            nearest,
+            touches,
+        )
+
+    def move(self, joint_velocities: Array) -> None:
+        """Advance the physics by one period, with the motors at `joint_velocities`, rad/s, (n,)."""
+        pybullet.setJointMotorControlArray(
+            self.arm.body,
+            self.arm.joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=joint_velocities.tolist(),
+            forces=self.arm.torques,
+            physicsClientId=self._client,
+        )
+        pybullet.stepSimulation(physicsClientId=self._client)
+
+    def close(self) -> None:
+        """End the simulation."""
+        if pybullet.isConnected(physicsClientId=self._client):
+            pybullet.disconnect(physicsClientId=self._client)
+
+    def _look_around(self, positions: Array) -> tuple[Nearest | None, tuple[Touch, ...]]:
+        nearest: Nearest | None = None
+        touches = []
+        for body, name in self._obstacles.items():
+            for point in pybullet.getClosestPoints(
+                self.arm.body, body, self._reach_m, physicsClientId=self._client
+            ):
+                link, on_arm, normal, distance = point[3], point[5], point[7], point[8]
+                if link == _BASE_LINK:
+                    continue
+                if nearest is None or distance < nearest.distance_m:
+                    nearest = Nearest(name, distance)
+                if distance <= _TOUCHING_M:
+                    touches.append(
+                        Touch(
+                            name,
+                            self.arm.separation_per_joint(
+                                link, np.array(on_arm), np.array(normal), positions
+                            ),
+                        )
+                    )
+        return nearest, tuple(touches)
+
+
+def start_posture(robot: str, start: Pose) -> Array:
+    """Return the joint positions, rad, shape (n,), that bring the tool of `robot` to `start`.
+
+    Raises UnreachablePoseError.
+    """
+    client = _connect(gui=False)
+    try:
+        model = ROBOTS[robot]
+        return inverse_kinematics(Arm(model, client), robot, start, np.array(model.home))
+    finally:
+        pybullet.disconnect(physicsClientId=client)
+
+
+def _connect(gui: bool) -> int:
+    try:
+        client: int = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+    except pybullet.error as error:
+        raise UserError(f"no window could be opened ({error}): run without gui") from error
+    if client < 0:
+        raise UserError("no window could be opened: is there a display? Run without gui")
+    return client
+
+
+def _add(obstacle: Obstacle, client: int) -> int:
+    collision: dict[str, Any]
+    visual: dict[str, Any]
+    if obstacle.size_m is not None:
+        kind = pybullet.GEOM_BOX
+        collision = visual = {"halfExtents": [length / 2 for length in obstacle.size_m]}
+    elif obstacle.length_m is not None:
+        kind = pybullet.GEOM_CYLINDER
+        collision = {"radius": obstacle.radius_m, "height": obstacle.length_m}
+        # PyBullet names the same length differently.
+        visual = {"radius": obstacle.radius_m, "length": obstacle.length_m}
+    else:
+        kind = pybullet.GEOM_SPHERE
+        collision = visual = {"radius": obstacle.radius_m}
+    body: int = pybullet.createMultiBody(
+        0,
+        pybullet.createCollisionShape(kind, **collision, physicsClientId=client),
+        pybullet.createVisualShape(
+            kind, **visual, rgbaColor=[0.45, 0.55, 0.65, 1], physicsClientId=client
+        ),
+        list(obstacle.position_m),
+        list(obstacle.orientation_xyzw),
+        physicsClientId=client,
+    )
+    return body

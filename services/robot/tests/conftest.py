@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pybullet
+import pytest
+
+from hmcs.task import Obstacle
+from hmcs_robot.arm import Arm
+from hmcs_robot.control import Following, Motion, Standing, Tuning, follow
+from hmcs_robot.driver import Pose
+from hmcs_robot.limits import Limits
+from hmcs_robot.robots import ROBOTS
+from hmcs_robot.simulation import Scene, Simulation
+
+PERIOD_S = 1 / 240
+STARTS = {
+    "puma560": Pose(np.array([0.60, 0.0, 0.50]), np.array([0, 0.5**0.5, 0, 0.5**0.5])),
+    "iiwa": Pose(np.array([0.60, 0.0, 0.45]), np.array([0, 0.5**0.5, 0, 0.5**0.5])),
+    "panda": Pose(
+        np.array([0.55, 0.0, 0.50]), np.array([0, 0.9238795325112867, 0, 0.3826834323650898])
+    ),
+}
+
+
+class Bench:
+    """A simulated arm with limits, driven cycle by cycle without a bus."""
+
+    def __init__(self, simulation: Simulation, limits: Limits) -> None:
+        self.simulation = simulation
+        self.limits = limits
+        self.tuning = Tuning()
+        self.carried: Following | Standing = Standing()
+
+    def follow(self, twist: np.ndarray) -> Motion:
+        """Follow `twist` for one cycle."""
+        motion = follow(
+            self.simulation.read(),
+            np.asarray(twist, dtype=float),
+            self.carried,
+            self.simulation.home,
+            self.limits,
+            self.tuning,
+            PERIOD_S,
+        )
+        self.carried = motion.carried
+        self.simulation.move(motion.joint_velocities)
+        return motion
+
+
+@pytest.fixture
+def starts() -> dict[str, Pose]:
+    return STARTS
+
+
+@pytest.fixture
+def period_s() -> float:
+    return PERIOD_S
+
+
+@pytest.fixture
+def bench() -> Iterator[Callable[..., Bench]]:
+    """Make a bench: robot, half size of the workspace (m) around the start, obstacles."""
+    made = []
+
+    def make(
+        robot: str = "puma560", half_m: float = 0.3, obstacles: tuple[Obstacle, ...] = ()
+    ) -> Bench:
+        start = STARTS[robot]
+        simulation = Simulation(Scene(robot, start, obstacles), PERIOD_S)
+        made.append(simulation)
+        limits = Limits(
+            simulation.limits, 0.25, 0.5, start.position - half_m, start.position + half_m
+        )
+        return Bench(simulation, limits)
+
+    yield make
+    for simulation in made:
+        simulation.close()
+
+
+@pytest.fixture
+def client() -> Iterator[int]:
+    """A PyBullet client with gravity."""
+    number = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(0, 0, -9.81, physicsClientId=number)
+    yield number
+    pybullet.disconnect(physicsClientId=number)
+
+
+@pytest.fixture(params=sorted(ROBOTS))
+def robot(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def arm(robot: str, client: int) -> Arm:
+    return Arm(ROBOTS[robot], client)

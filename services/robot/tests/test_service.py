@@ -1,0 +1,241 @@
+"""The robot on a bus of its own, pumped beside a writer in one thread."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hmcs.bus.config import BusSettings
+from hmcs.bus.messages import Command, Origin, RobotState
+from hmcs.bus.router import open_router
+from hmcs.bus.session import Bus, Publisher, Received
+from hmcs_robot.service import Robot
+from hmcs_robot.settings import RobotSettings
+
+DEADLINE_S = 10.0
+TASK = """
+format: hmcs-task/1
+name: push
+dead_zone_m: 0.01
+gestemes: [{name: go}]
+states: [{name: going, gestemes: [go], next: []}]
+start: [going]
+workspace:
+  lower_m: [0.4, -0.3, 0.2]
+  upper_m: [0.8, 0.3, 0.8]
+  obstacles:
+    - {name: wall, shape: box, position_m: [0.6, 0.13, 0.5], size_m: [0.3, 0.1, 0.3]}
+robot:
+  model: puma560
+  tool_start_m: [0.6, 0.0, 0.5]
+  tool_orientation_xyzw: [0.0, 0.7071067811865476, 0.0, 0.7071067811865476]
+"""
+
+
+class Cell:
+    """A robot, what it says, and writers of commands."""
+
+    def __init__(self, router: str, task: Path, hang_s: float) -> None:
+        self.settings = BusSettings(router=router)
+        self.buses: list[Bus] = []
+        self.bus = self.open("robot")
+        settings = RobotSettings(router=router, task=str(task), hang_s=hang_s)
+        self.robot = Robot(settings, self.bus, logging.getLogger("robot"))
+        self.robot.start()
+        self.said: list[RobotState] = []
+        self.origins: list[Origin | None] = []
+        self.writers: dict[str, Publisher[Command]] = {}
+        observer = self.open("observer")
+        observer.subscribe(RobotState, observer.keys.robot_state, self._hear)
+
+    def open(self, service: str) -> Bus:
+        self.buses.append(Bus.open(self.settings, service, "test"))
+        return self.buses[-1]
+
+    def writer(self, name: str) -> Publisher[Command]:
+        if name not in self.writers:
+            bus = self.open(name)
+            self.writers[name] = bus.publisher(Command, bus.keys.command)
+        return self.writers[name]
+
+    def say(self, engaged: bool, y_m_s: float = 0.0, writer: str = "fixture") -> None:
+        twist = np.array([0.0, y_m_s, 0, 0, 0, 0])
+        self.writer(writer).put(
+            Command(twist=twist, valid_for_ns=500_000_000, engaged=engaged),
+            Origin(boot="hand", seq=7, captured_ns=1),
+        )
+
+    def until(
+        self, true: Callable[[RobotState], bool], say: Callable[[], None] | None = None
+    ) -> RobotState:
+        """Pump until a state is as wished, and return it; meanwhile `say` about every 10 ms."""
+        began = time.monotonic()
+        self.said.clear()
+        while time.monotonic() - began < DEADLINE_S:
+            if say:
+                say()
+            for bus in self.buses:
+                bus.pump(0.002)
+            if self.said and true(self.said[-1]):
+                return self.said[-1]
+        raise AssertionError(f"never came true; at last: {self.said[-1] if self.said else None}")
+
+    def engage(self, y_m_s: float = 0.0, writer: str = "fixture") -> None:
+        self.until(lambda s: s.stop == "disengaged", lambda: self.say(False, writer=writer))
+        self.until(lambda s: s.stop == "none", lambda: self.say(True, y_m_s, writer))
+
+    def _hear(self, received: Received[RobotState]) -> None:
+        self.said.append(received.body)
+        self.origins.append(received.envelope.origin)
+
+    def close(self) -> None:
+        self.robot.close()
+        for bus in self.buses:
+            bus.close()
+
+
+@pytest.fixture
+def router() -> Iterator[str]:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    with open_router(endpoint):
+        yield endpoint
+
+
+@pytest.fixture
+def task(tmp_path: Path) -> Path:
+    path = tmp_path / "push.yaml"
+    path.write_text(TASK)
+    return path
+
+
+@pytest.fixture
+def cell(router: str, task: Path, request: pytest.FixtureRequest) -> Iterator[Cell]:
+    # Patient by default, so that a busy machine is not taken for a hang.
+    made = Cell(router, task, hang_s=getattr(request, "param", 5.0))
+    yield made
+    made.close()
+
+
+def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cell) -> None:
+    begun = cell.until(lambda _: True)
+    assert begun.stop == "no_command"
+    assert begun.robot == "puma560"
+    assert begun.tool_position == pytest.approx([0.6, 0.0, 0.5], abs=1e-4)
+    assert begun.nearest_obstacle == "wall"
+    cell.engage(-0.1)
+    cell.until(lambda s: s.tool_position[1] < -0.03, lambda: cell.say(True, -0.1))
+    moving = cell.said[-1]
+    assert moving.tool_twist[:3] == pytest.approx([0, -0.1, 0], abs=0.005)
+    assert moving.reference_twist == pytest.approx([0, -0.1, 0, 0, 0, 0], abs=1e-6)
+    assert cell.origins[-1] == Origin(boot="hand", seq=7, captured_ns=1)
+    assert cell.robot.health() == (True, "following commands")
+
+
+def test_silence_makes_it_stand_until_it_is_engaged_anew(cell: Cell) -> None:
+    cell.engage(-0.1)
+    stopped = cell.until(lambda s: s.stop == "stale_command")
+    assert not stopped.reference_twist.any()
+    cell.until(lambda s: np.abs(s.joint_velocities).max() < 1e-3)
+    for _ in range(20):
+        cell.until(lambda _: True, lambda: cell.say(True, -0.1))
+    assert cell.said[-1].stop == "stale_command"
+    assert cell.origins[-1] is None
+    cell.engage(-0.1)
+
+
+def test_a_second_writer_is_refused_and_counted(cell: Cell) -> None:
+    cell.writer("intruder")
+    cell.engage(-0.05)
+
+    turns = itertools.cycle((("fixture", True), ("intruder", False)))
+
+    def in_turns() -> None:
+        writer, engaged = next(turns)
+        cell.say(engaged, -0.05, writer)
+
+    cell.until(lambda s: s.tool_position[1] < -0.02, in_turns)
+    assert cell.bus.counters.refused["command"] > 0
+    assert all(state.stop == "none" for state in cell.said)
+
+
+def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:
+    cell.engage(0.2)
+    hit = cell.until(lambda s: s.stop == "collision", lambda: cell.say(True, 0.2))
+    assert hit.contacts == ("wall",)
+    cell.until(lambda s: np.abs(s.joint_velocities).max() < 1e-3, lambda: cell.say(True, 0.2))
+    assert cell.said[-1].stop == "collision"
+    cell.engage(-0.1)
+    away = cell.until(lambda s: s.tool_position[1] < 0.0, lambda: cell.say(True, -0.1))
+    assert away.contacts == ()
+
+
+def test_what_is_no_command_is_refused_and_told_as_the_reason(cell: Cell) -> None:
+    bus = cell.open("broken")
+    raw = bus._session.declare_publisher(bus.keys.command)
+    cell.engage(-0.05)
+    state = cell.until(lambda s: s.stop != "none", lambda: raw.put(b"\xc1 no msgpack"))
+    assert state.stop == "refused_command"
+
+
+@pytest.mark.parametrize("cell", [0.25], indirect=True)
+def test_a_hang_of_its_own_stops_it(cell: Cell) -> None:
+    cell.engage(-0.05)
+    began = time.monotonic()
+    while time.monotonic() - began < 0.3:
+        cell.say(True, -0.05)
+        for bus in cell.buses[1:]:
+            bus.pump(0.005)
+    cell.until(lambda s: s.stop == "stale_command", lambda: cell.say(True, -0.05))
+    assert cell.bus.counters.late["command"] > 0
+
+
+def test_a_task_out_of_its_reach_ends_the_process_with_2_and_says_why(
+    router: str, task: Path
+) -> None:
+    task.write_text(
+        TASK.replace("tool_start_m: [0.6, 0.0, 0.5]", "tool_start_m: [2.0, 0.0, 0.5]").replace(
+            "upper_m: [0.8", "upper_m: [2.8"
+        )
+    )
+    ended = subprocess.run(
+        [sys.executable, "-m", "hmcs_robot", "--router", router, "--task", str(task)],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert "robot puma560 cannot bring its tool to position (2.000, 0.000, 0.500)" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_sigterm_ends_it_cleanly(router: str, task: Path) -> None:
+    with (
+        Bus.open(BusSettings(router=router), "observer", "test") as bus,
+        subprocess.Popen(
+            [sys.executable, "-m", "hmcs_robot", "--router", router, "--task", str(task)]
+        ) as process,
+    ):
+        try:
+            heard: list[RobotState] = []
+            bus.subscribe(RobotState, bus.keys.robot_state, lambda r: heard.append(r.body))
+            began = time.monotonic()
+            while not heard and time.monotonic() - began < DEADLINE_S:
+                bus.pump(0.05)
+            assert heard
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(timeout=5) == 0
+        finally:
+            process.kill()

@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hmcs.task import Obstacle
+from hmcs_robot.driver import Pose
+from hmcs_robot.kinematics import UnreachablePoseError
+from hmcs_robot.simulation import Scene, Simulation, StartPoseError
+
+WALL = Obstacle(name="wall", shape="box", position_m=(0.60, 0.25, 0.50), size_m=(0.3, 0.1, 0.3))
+BALL = Obstacle(name="ball", shape="sphere", position_m=(0.60, 0.0, 0.65), radius_m=0.05)
+POST = Obstacle(
+    name="post", shape="cylinder", position_m=(0.60, -0.12, 0.5), radius_m=0.02, length_m=0.4
+)
+
+
+def drive(rig: Any, twist: Any, cycles: int = 600) -> tuple[str, ...]:
+    """Follow `twist` until something is touched; return what."""
+    for _ in range(cycles):
+        rig.follow(twist)
+        contacts: tuple[str, ...] = rig.simulation.read().contacts
+        if contacts:
+            return contacts
+    return ()
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "twist"),
+    [(WALL, [0, 0.1, 0, 0, 0, 0]), (BALL, [0, 0, 0.1, 0, 0, 0]), (POST, [0, -0.1, 0, 0, 0, 0])],
+)
+def test_driving_into_an_obstacle_is_a_contact_with_it(
+    bench: Any, obstacle: Obstacle, twist: list[float]
+) -> None:
+    rig = bench(obstacles=(obstacle,))
+    nearest = rig.simulation.read().nearest
+    assert nearest is not None
+    assert nearest.distance_m > 0.01
+    assert drive(rig, twist) == (obstacle.name,)
+    nearest = rig.simulation.read().nearest
+    assert nearest is not None
+    assert nearest.name == obstacle.name
+    assert -0.005 < nearest.distance_m < 0.001
+
+
+def test_nearest_distance_is_that_of_the_shapes(bench: Any) -> None:
+    # The pen is a cylinder along x of radius 5 mm at its tip; the sphere hangs above the tip.
+    rig = bench(
+        obstacles=(
+            Obstacle(name="ball", shape="sphere", position_m=(0.62, 0, 0.65), radius_m=0.04),
+        )
+    )
+    found = rig.simulation.read().nearest
+    assert found is not None
+    expected = np.hypot(0.02, 0.15 - 0.005) - 0.04
+    assert found.distance_m == pytest.approx(expected, abs=0.002)
+
+
+def test_an_obstacle_out_of_reach_of_the_search_is_not_named(bench: Any) -> None:
+    far = Obstacle(name="far", shape="sphere", position_m=(-2, 0, 0.5), radius_m=0.1)
+    assert bench(obstacles=(far,)).simulation.read().nearest is None
+
+
+def test_a_touching_arm_cannot_press_on_but_can_move_away(bench: Any) -> None:
+    rig = bench(obstacles=(WALL,))
+    assert drive(rig, [0, 0.1, 0, 0, 0, 0]) == ("wall",)
+    before = rig.simulation.read().tool.position
+    blocked = 0
+    for _ in range(120):
+        blocked += "contact" in rig.follow([0, 0.1, 0, 0, 0, 0]).limited
+    pressed = rig.simulation.read()
+    assert blocked > 0
+    assert pressed.tool.position[1] - before[1] < 0.002
+    for _ in range(120):
+        motion = rig.follow([0, -0.1, 0, 0, 0, 0])
+    away = rig.simulation.read()
+    assert "contact" not in motion.limited
+    assert away.contacts == ()
+    assert before[1] - away.tool.position[1] > 0.03
+
+
+def test_parting_speed_has_the_sign_of_the_distance(bench: Any) -> None:
+    rig = bench(obstacles=(WALL,))
+    drive(rig, [0, 0.1, 0, 0, 0, 0])
+    arm = rig.simulation.read()
+    inward = np.linalg.pinv(arm.jacobian) @ [0, 1, 0, 0, 0, 0]
+    assert all(touch.separation_per_joint @ inward < -0.5 for touch in arm.touches)
+
+
+def test_an_obstacle_at_the_start_pose_is_refused(starts: dict[str, Pose]) -> None:
+    hit = Obstacle(name="hit", shape="sphere", position_m=(0.60, 0.0, 0.50), radius_m=0.05)
+    with pytest.raises(StartPoseError, match="touches hit at the start pose"):
+        Simulation(Scene("puma560", starts["puma560"], (hit,)), 1 / 240)
+
+
+def test_an_unreachable_start_pose_is_refused(starts: dict[str, Pose]) -> None:
+    far = starts["puma560"]._replace(position=np.array([1.6, 0.0, 0.5]))
+    with pytest.raises(UnreachablePoseError, match="puma560"):
+        Simulation(Scene("puma560", far, ()), 1 / 240)
+
+
+def test_the_arm_begins_at_rest_at_the_start_pose(
+    bench: Any, robot: str, starts: dict[str, Pose]
+) -> None:
+    arm = bench(robot).simulation.read()
+    assert arm.tool.position == pytest.approx(starts[robot].position, abs=1e-5)
+    assert not arm.joint_velocities.any()

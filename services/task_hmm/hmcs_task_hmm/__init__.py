@@ -1,0 +1,1 @@
+"""Gathers evidence from all classifiers and publishes the belief over task states."""

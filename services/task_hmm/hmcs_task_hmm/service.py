@@ -1,0 +1,145 @@
+"""The service: evidence in, one call into the segment filter, beliefs out."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+from hmcs.bus.logs import Seldom
+from hmcs.bus.messages import Belief, Evidence, Origin
+from hmcs.bus.service import Service
+from hmcs.bus.session import Bus, Received
+from hmcs.bus.step_feed import FedStep, StepFeed
+from hmcs.bus.timers import Timer
+from hmcs.motion.steps import Step
+from hmcs.recognition.model_file import load_model
+from hmcs.recognition.recognizer import LayeredRecognizer, Recognition, TaskRecognizer
+from hmcs_task_hmm.gathering import Gathering
+from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
+from hmcs_task_hmm.settings import TaskHmmSettings
+
+_NS_PER_MS = 1_000_000
+
+
+class TaskHmm(Service):
+    """Publishes a belief for every step, with all evidence or, past the deadline, without."""
+
+    name = "task_hmm"
+    Settings = TaskHmmSettings
+
+    def __init__(self, settings: TaskHmmSettings, bus: Bus, log: logging.Logger) -> None:
+        super().__init__(settings, bus, log)
+        self._model = load_model(settings.model)
+        self._recognizer = TaskRecognizer(self._model)
+        self._warming: LayeredRecognizer | None = None
+        self._gathering = Gathering(
+            self._recognizer.gestemes, round(settings.deadline_ms * _NS_PER_MS)
+        )
+        self._origins: dict[int, Origin | None] = {}
+        self._clock = ""
+        self._timer: Timer | None = None
+        self._degraded = 0
+        self._seldom = Seldom(log)
+        self._belief = bus.publisher(Belief, bus.keys.belief(self._model.name))
+        self._feed = StepFeed(
+            bus,
+            log,
+            self._on_step,
+            self._on_restart,
+            memory_steps=self._model.scoring.window_steps,
+        )
+
+    def start(self) -> None:
+        """Catch up with the motion so far; beliefs begin with the next step."""
+        self._warming = LayeredRecognizer(self._model)
+        self._feed.begin()
+        self._recognizer, self._warming = self._warming.task, None
+        self.bus.subscribe(Evidence, self.bus.keys.evidence(self._model.name), self._on_evidence)
+        self.bus.announce(
+            self.bus.keys.member(self._model.name, self.name, self.bus.source.instance)
+        )
+
+    def health(self) -> tuple[bool, str]:
+        """Healthy always; tells how many beliefs were degraded."""
+        return True, f"{self._model.name}: {self._degraded} degraded beliefs"
+
+    def facts(self) -> dict[str, str]:
+        """Return the model."""
+        return {"model": self._model.name, "model_hash": self._model.hash}
+
+    def _on_restart(self, index: int) -> None:
+        # A motion that is joined in its middle may be in any state of the task.
+        anywhere = index > 0
+        if self._warming is not None:
+            self._warming = LayeredRecognizer(self._model, anywhere=anywhere)
+        else:
+            self._recognizer = TaskRecognizer(self._model, anywhere=anywhere)
+        self._gathering.restart(index)
+        self._origins.clear()
+        self.log.info("beginning anew", extra={"step": index})
+
+    def _on_step(self, fed: FedStep) -> None:
+        step = fed.step
+        self._clock = fed.clock
+        if self._warming is not None:
+            self._warming.step(Step(step.index, step.position, step.displacement))
+            self._gathering.restart(step.index + 1)
+            return
+        self._origins[step.index] = fed.origin
+        self._gathering.begin(step.index, fed.received_ns)
+        self._release()
+
+    def _on_evidence(self, received: Received[Evidence]) -> None:
+        message = received.body
+        if self._clock and message.clock != self._clock:
+            self._refuse("evidence for another input device's steps")
+            return
+        try:
+            evidence = read_evidence(message, self._model)
+        except UnusableEvidenceError as error:
+            self._refuse(f"{received.envelope.source.instance}: {error}")
+            return
+        if self._gathering.add(evidence, received.received_ns) == "late":
+            self.bus.counters.count_late(Evidence.SCHEMA)
+        self._release()
+
+    def _release(self) -> None:
+        while (released := self._gathering.release(time.monotonic_ns())) is not None:
+            recognition = self._recognizer.step(released.evidence)
+            if recognition.belief.missing:
+                self._degraded += 1
+                names = self._named(recognition.belief.missing)
+                self._seldom.warning("degraded", "no evidence in time", gestemes=", ".join(names))
+            step = released.evidence.step
+            self._belief.put(self._message(recognition), self._origins.pop(step, None))
+        self._set_timer()
+
+    def _set_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        due_ns = self._gathering.due_ns
+        self._timer = None if due_ns is None else self.bus.at(due_ns, self._release)
+
+    def _message(self, recognition: Recognition) -> Belief:
+        belief = recognition.belief
+        return Belief(
+            model_hash=self._model.hash,
+            clock=self._clock,
+            step=belief.step,
+            states=self._model.state_names,
+            probabilities=belief.states,
+            unknown=belief.unknown,
+            likely_gesteme=self._model.gesteme_names[belief.gesteme],
+            segment_start=belief.segment_start,
+            log_likelihood=belief.log_likelihood,
+            mean_log_likelihood=recognition.mean_log_likelihood,
+            unknown_alarm=recognition.unknown_alarm,
+            missing_gestemes=self._named(belief.missing),
+        )
+
+    def _named(self, gestemes: tuple[int, ...]) -> tuple[str, ...]:
+        return tuple(self._model.gesteme_names[g] for g in gestemes)
+
+    def _refuse(self, reason: str) -> None:
+        self.bus.counters.count_refused(Evidence.SCHEMA, reason)
+        self._seldom.warning("refused", "evidence refused", reason=reason)

@@ -1,0 +1,152 @@
+"""Gathering: whatever the order of arrival, each step is released once, in order, in time."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmcs.recognition.gestemes import StepEvidence
+from hmcs_task_hmm.gathering import Gathering
+
+DEADLINE_NS = 20
+
+
+def evidence(step, gestemes, ratio=0.0):
+    held = sorted(gestemes)
+    return StepEvidence(
+        step,
+        tuple(held),
+        np.array(held, dtype=np.int32),
+        np.full(len(held), step, dtype=np.int32),
+        np.zeros(len(held)),
+        np.full(len(held), ratio),
+    )
+
+
+def gathering(gestemes=(0, 1, 2)):
+    return Gathering(gestemes, DEADLINE_NS)
+
+
+def test_a_step_is_released_as_soon_as_every_gesteme_is_covered():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    assert g.add(evidence(0, {0, 1}), 0) == "taken"
+    assert g.release(now_ns=1) is None
+    assert g.add(evidence(0, {2}), 0) == "taken"
+    released = g.release(now_ns=2)
+    assert released is not None
+    assert released.evidence.gestemes == (0, 1, 2)
+    assert not released.overdue
+    assert g.release(now_ns=3) is None
+
+
+def test_past_the_deadline_a_step_is_released_with_what_came():
+    g = gathering()
+    g.begin(0, now_ns=100)
+    g.add(evidence(0, {1}), 101)
+    assert g.due_ns == 120
+    assert g.release(now_ns=119) is None
+    released = g.release(now_ns=120)
+    assert released is not None
+    assert released.overdue
+    assert released.evidence.gestemes == (1,)
+
+
+def test_with_no_classifier_at_all_a_step_is_released_empty():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    released = g.release(now_ns=DEADLINE_NS)
+    assert released is not None
+    assert released.evidence.gestemes == ()
+    assert len(released.evidence.pair_start) == 0
+
+
+def test_the_first_evidence_for_a_gesteme_wins():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.add(evidence(0, {0, 1}, ratio=1.0), 0)
+    assert g.add(evidence(0, {0, 1}, ratio=2.0), 0) == "duplicate"
+    assert g.add(evidence(0, {1, 2}, ratio=3.0), 0) == "taken"
+    released = g.release(now_ns=1)
+    assert released is not None
+    by_gesteme = dict(zip(released.evidence.pair_gesteme, released.evidence.log_ratio, strict=True))
+    assert by_gesteme == {0: 1.0, 1: 1.0, 2: 3.0}
+
+
+def test_evidence_that_overtakes_its_step_waits_for_it():
+    g = gathering()
+    assert g.add(evidence(0, {0, 1, 2}), 0) == "taken"
+    assert g.release(now_ns=0) is None
+    g.begin(0, now_ns=1)
+    assert g.release(now_ns=1) is not None
+
+
+def test_evidence_for_a_step_released_at_its_deadline_is_late():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.release(now_ns=DEADLINE_NS)
+    assert g.add(evidence(0, {0}), DEADLINE_NS + 1) == "late"
+
+
+def test_the_second_of_two_classifiers_is_no_late_one_unless_the_deadline_has_passed():
+    g = gathering()
+    for t in range(3):
+        g.begin(t, now_ns=10 * t)
+        g.add(evidence(t, {0, 1, 2}), 10 * t + 1)
+        assert g.release(now_ns=10 * t + 1) is not None
+    assert g.add(evidence(1, {0, 1, 2}), 10 + DEADLINE_NS) == "duplicate"
+    assert g.add(evidence(1, {0, 1, 2}), 11 + DEADLINE_NS) == "late"
+    assert g.add(evidence(0, {0, 1, 2}), 11 + DEADLINE_NS) == "late"
+
+
+def test_after_a_restart_only_later_steps_count():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.add(evidence(0, {0}), 0)
+    g.restart(40)
+    assert g.add(evidence(39, {0}), 0) == "late"
+    g.begin(40, now_ns=0)
+    g.add(evidence(40, {0, 1, 2}), 0)
+    released = g.release(now_ns=0)
+    assert released is not None
+    assert released.evidence.step == 40
+
+
+@given(st.data())
+def test_every_step_is_released_once_and_in_order_whatever_comes_when(data):
+    steps = data.draw(st.integers(1, 6))
+    events = [("begin", t, frozenset()) for t in range(steps)]
+    for t in range(steps):
+        for _ in range(data.draw(st.integers(0, 3))):
+            events.append(
+                ("evidence", t, data.draw(st.frozensets(st.sampled_from([0, 1, 2]), min_size=1)))
+            )
+    events = data.draw(st.permutations(events))
+    g, released, now_ns = gathering(), [], 0
+    for kind, t, gestemes in events:
+        now_ns += data.draw(st.integers(0, 15))
+        if kind == "begin":
+            g.begin(t, now_ns)
+        else:
+            verdict = g.add(evidence(t, gestemes), now_ns)
+            assert (verdict == "taken") <= (t >= len(released))
+            assert (verdict == "late") <= (t < len(released))
+        while (item := g.release(now_ns)) is not None:
+            released.append(item)
+    while (item := g.release(now_ns + DEADLINE_NS)) is not None:
+        released.append(item)
+    assert [item.evidence.step for item in released] == list(range(steps))
+    for item in released:
+        held = item.evidence.gestemes
+        assert len(set(held)) == len(held)
+        assert item.overdue == (set(held) != {0, 1, 2})
+
+
+@pytest.mark.parametrize("now_ns", [0, 5])
+def test_the_next_deadline_is_that_of_the_next_step(now_ns):
+    g = gathering()
+    assert g.due_ns is None
+    g.begin(1, now_ns)
+    assert g.due_ns is None
+    g.begin(0, now_ns + 3)
+    assert g.due_ns == now_ns + 3 + DEADLINE_NS

@@ -1,0 +1,1 @@
+"""Learns a model from demonstrations of a task."""

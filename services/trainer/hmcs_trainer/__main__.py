@@ -1,0 +1,54 @@
+"""Trains once and ends: what compose runs before the stack, with the CLI of `hmcs train`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from hmcs.errors import UserError
+from hmcs.task import load_task
+from hmcs_trainer.performance import perform
+from hmcs_trainer.training import train
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments; return the exit code, 2 for a mistake of the user."""
+    parser = argparse.ArgumentParser(prog="hmcs_trainer", description=__doc__)
+    parser.add_argument("task", help="name of a shipped task or a task file")
+    parser.add_argument(
+        "demonstrations", nargs="+", help="CSV files, or lasa:SHAPE/NUMBER or lasa:SHAPE/FIRST-LAST"
+    )
+    parser.add_argument("--output", required=True, help="the model file to write")
+    parser.add_argument("--name", help="of the recognizer; the task's name by default")
+    parser.add_argument(
+        "--performance", nargs="+", default=[], help="demonstrations to chain for the input device"
+    )
+    parser.add_argument("--performance-output", help="the CSV file to write them to")
+    parser.add_argument(
+        "--ring", action="store_true", help="bend the performance to end where it began"
+    )
+    given = parser.parse_args(argv)
+    if bool(given.performance) != bool(given.performance_output):
+        parser.error("--performance and --performance-output go together")
+    try:
+        model = train(
+            given.task,
+            given.demonstrations,
+            given.output,
+            name=given.name,
+            progress=lambda line: print(line, file=sys.stderr),
+        )
+        if given.performance:
+            perform(
+                load_task(given.task), given.performance, given.performance_output, ring=given.ring
+            )
+    except UserError as error:
+        print(f"hmcs_trainer: {error}", file=sys.stderr)
+        return 2
+    print(f"{given.output}: {model.name}, {len(model.gesteme_names)} gestemes, hash {model.hash}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,35 @@
+"""Demonstrations by reference: a CSV file's path, or `lasa:SHAPE/NUMBER`."""
+
+from __future__ import annotations
+
+import re
+
+from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
+from hmcs.task import Task
+from hmcs_trainer.lasa import read_drawing
+
+_DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
+
+
+def read_references(references: list[str], task: Task) -> list[Demonstration]:
+    """Return the demonstrations of a task that the references name.
+
+    `lasa:SHAPE/FIRST-LAST` names several drawings. Raises DemonstrationError for a reference that
+    names none.
+    """
+    return [demonstration for item in references for demonstration in _read(item, task)]
+
+
+def _read(reference: str, task: Task) -> list[Demonstration]:
+    if not reference.startswith("lasa:"):
+        return [read_csv(reference)]
+    match = _DRAWING.fullmatch(reference)
+    if match is None:
+        raise DemonstrationError(
+            f"{reference}: write lasa:SHAPE/NUMBER or lasa:SHAPE/FIRST-LAST, e.g. lasa:Sine/1-5"
+        )
+    first = int(match["first"])
+    last = int(match["last"] or first)
+    if last < first:
+        raise DemonstrationError(f"{reference}: the first number is larger than the last")
+    return [read_drawing(match["shape"], number, task) for number in range(first, last + 1)]

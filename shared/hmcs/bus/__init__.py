@@ -1,0 +1,1 @@
+"""The wire: what travels between processes, where and how. It knows no gestemes."""

@@ -1,0 +1,430 @@
+"""What travels: every message of the protocol, on one page.
+
+A message is a frozen pydantic model of its body alone. On the wire it is one msgpack map: the
+fields of the body beside those of its `Envelope` (`schema`, `source`, `seq`, `origin`). Unknown
+fields are ignored on reading (a newer peer sent them); missing, mistyped, misshapen or non-finite
+ones are refused.
+
+Conventions (REP 103, REP 105): SI units; right-handed frames, x forward, z up; quaternions
+x y z w; twists and wrenches linear part first; poses in the robot's base frame unless a field says
+otherwise; times in nanoseconds. The *operator frame* is the one hand positions are measured in:
+its axes are parallel to the robot's base axes, its zero is the device's own.
+
+`t` is the index of a step. Step t is the motion from x_t to x_{t+1}; a segment that starts at s has
+step s as its first and x_s as its origin.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from hmcs.bus.arrays import (
+    EvidenceFloats,
+    Floats,
+    Indices,
+    Quaternion,
+    Vector3,
+    Vector6,
+)
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class Part(BaseModel):
+    """A part of a message: frozen, strict about types, tolerant of fields it does not know."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        strict=True,
+        extra="ignore",
+        allow_inf_nan=False,
+        arbitrary_types_allowed=True,
+        use_attribute_docstrings=True,
+    )
+
+
+class Message(Part):
+    """The body of a message: `SCHEMA` names it on the wire, `VERSION` counts breaking changes."""
+
+    SCHEMA: ClassVar[str]
+    VERSION: ClassVar[int] = 1
+
+
+class Source(Part):
+    """Who sent a message."""
+
+    service: Name
+    """Kind of process, e.g. `gesteme_classifier`."""
+    instance: Name
+    """Which one of its kind."""
+    boot: Name
+    """A new value at every start of the process: sequence numbers count within one boot."""
+
+
+class Origin(Part):
+    """The operator sample that caused a message, handed on from hop to hop."""
+
+    boot: Name
+    """Boot of the input device that captured the sample."""
+    seq: Count
+    """Sequence number of its Motion."""
+    captured_ns: int
+    """Capture time by that device's own monotonic clock, ns; comparable only where it was taken."""
+
+
+class Envelope(Part):
+    """What every message carries besides its body."""
+
+    source: Source
+    seq: Count
+    """Counts what this source published on this key, from 0."""
+    origin: Origin | None = None
+    """None where no operator sample caused the message."""
+
+
+# --- the fast loop: operator, fixture, robot ------------------------------------------------------
+
+
+class Motion(Message):
+    """One sample of the operator's device."""
+
+    SCHEMA = "motion"
+
+    position: Vector3
+    """Of the hand, m, operator frame, shape (3,)."""
+    velocity: Vector3
+    """Of the hand, m/s, shape (3,)."""
+    orientation: Quaternion | None = None
+    """Of the hand, x y z w, shape (4,); None where the device has none."""
+    angular_velocity: Vector3 | None = None
+    """rad/s, shape (3,); None where the device has none."""
+    wrench: Vector6 | None = None
+    """The operator's force, N, then torque, N·m, shape (6,); None where the device has none."""
+    dead_man: bool
+    """True while the operator holds the enabling switch: without it the robot does not move."""
+    clutch: bool = False
+    """True while the hand is being repositioned: the robot stays where it is."""
+    pedal: bool = False
+    """A second switch, for marking and for explicit cues."""
+
+
+class Command(Message):
+    """What the robot is to do now."""
+
+    SCHEMA = "command"
+
+    twist: Vector6
+    """Reference velocity of the tool, m/s and rad/s, shape (6,)."""
+    valid_for_ns: Annotated[int, Field(gt=0, le=1_000_000_000)]
+    """How long after its arrival the robot may act on it."""
+    engaged: bool
+    """False commands a stop. After a stop of its own the robot moves again only once it has seen
+    False and then True: a deliberate re-engage."""
+
+
+class FixtureState(Message):
+    """What the fixture is doing, and why."""
+
+    SCHEMA = "fixture_state"
+
+    law: Name
+    """The law that made the command."""
+    model: str
+    """The active recognizer's model; empty while there is none."""
+    state: str
+    """The task state whose fixture is applied; empty in free motion."""
+    factor: Annotated[float, Field(ge=0, le=1)]
+    """Fixturing factor k: how strongly motion across the preferred direction is reduced."""
+    compliance: Annotated[float, Field(ge=0, le=1)]
+    """c_τ: 1 is free motion, 0 a hard fixture."""
+    preferred_direction: Vector3
+    """Unit vector, or zero in free motion, shape (3,)."""
+    progress: Annotated[float, Field(ge=0, le=1)]
+    """How far along the state's learned path, by path length."""
+    operator_twist: Vector6
+    """The operator's velocity as the law saw it, shape (6,)."""
+    command_twist: Vector6
+    """The reference velocity it made of it, shape (6,)."""
+    wrench: Vector6
+    """The fixture's force on the operator, for a haptic device, N and N·m, shape (6,)."""
+    engaged: bool
+    """Whether the operator is driving."""
+    reason: Literal[
+        "guiding",
+        "unsure",
+        "no_belief",
+        "belief_stale",
+        "belief_degraded",
+        "unknown_motion",
+        "disengaged",
+        "input_stale",
+    ]
+    """Why the fixture is as stiff as it is."""
+
+
+class RobotState(Message):
+    """Where the robot is and what it touches."""
+
+    SCHEMA = "robot_state"
+
+    robot: Name
+    """Which robot, e.g. `puma560`."""
+    joint_positions: Floats
+    """rad, shape (n,)."""
+    joint_velocities: Floats
+    """rad/s, shape (n,)."""
+    tool_position: Vector3
+    """m, base frame, shape (3,)."""
+    tool_orientation: Quaternion
+    """x y z w, base frame, shape (4,)."""
+    tool_twist: Vector6
+    """m/s and rad/s, base frame, shape (6,)."""
+    reference_twist: Vector6
+    """The velocity it is following now, after its own limits, shape (6,)."""
+    nearest_obstacle: str
+    """Name of the nearest obstacle; empty where none is within reach of the search."""
+    nearest_distance_m: Annotated[float, Field(ge=-1)] | None
+    """Distance to it; None where none is within reach of the search; negative in penetration."""
+    contacts: tuple[str, ...]
+    """Names of what the robot touches."""
+    stop: Literal[
+        "none",
+        "disengaged",
+        "no_command",
+        "stale_command",
+        "refused_command",
+        "second_writer",
+        "collision",
+    ]
+    """Why the robot stands; `none` while it follows commands."""
+    limited: tuple[str, ...]
+    """Limits that shape the motion now, e.g. `speed`, `workspace`, `joint_3`, `singularity`."""
+
+
+# --- the slow loop: steps, evidence, belief -------------------------------------------------------
+
+
+class Step(Message):
+    """The hand has moved by the dead zone δ: the classifiers' common clock."""
+
+    SCHEMA = "step"
+
+    index: Count
+    """t, without gaps within one boot of the input device."""
+    position: Vector3
+    """x_t, where the step begins, m, shape (3,). The path of the *engaged* hand: motion made with
+    the dead-man released or the clutch pressed is taken out, so the path has no jumps."""
+    displacement: Vector3
+    """x_{t+1} − x_t, m, shape (3,); at least δ long."""
+
+
+class Evidence(Message):
+    """What one classifier makes of one step: a sparse list of living (gesteme, start) pairs."""
+
+    SCHEMA = "evidence"
+
+    model_hash: Name
+    """Of the model file; a task refuses another model's evidence."""
+    clock: Name
+    """Boot of the input device whose steps are meant."""
+    step: Count
+    """t."""
+    gestemes: tuple[Name, ...]
+    """The gestemes this classifier holds, with or without a living pair."""
+    pair_gesteme: Indices
+    """Index into `gestemes` of each pair, shape (p,)."""
+    pair_start: Indices
+    """Start step s of each pair, shape (p,)."""
+    exit: EvidenceFloats
+    """Probability of leaving before step t, given steps s..t−1; 0 for s = t; shape (p,)."""
+    log_ratio: EvidenceFloats
+    """Tempered log-likelihood ratio of step t against the model's background level, given no exit,
+    nats, shape (p,)."""
+
+
+class Belief(Message):
+    """What the task recognizer holds to be true after one step."""
+
+    SCHEMA = "belief"
+
+    model_hash: Name
+    """Of the model file."""
+    clock: Name
+    """Boot of the input device whose steps are meant."""
+    step: Count
+    """t."""
+    states: tuple[Name, ...]
+    """Task states in the order of the model."""
+    probabilities: Floats
+    """P(state | steps 0..t), one for each state, shape (len(states),)."""
+    unknown: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """P(motion is no part of the task | steps 0..t); with `probabilities` sums to one."""
+    likely_gesteme: str
+    """The most probable gesteme in the most probable state; empty while nothing is likely."""
+    segment_start: Count
+    """The most probable start step s of the most probable state's segment."""
+    log_likelihood: float = 0.0
+    """Of step t given all before it, against the background level, nats."""
+    mean_log_likelihood: float = 0.0
+    """Mean of it over the model's alarm window."""
+    unknown_alarm: bool = False
+    """True where that mean is below the threshold learned from the demonstrations."""
+    missing_gestemes: tuple[Name, ...] = ()
+    """Gestemes of the task no evidence came for; the belief is degraded unless this is empty."""
+
+    @property
+    def likely_state(self) -> str:
+        """The most probable task state."""
+        return self.states[int(self.probabilities.argmax())]
+
+    @property
+    def confidence(self) -> float:
+        """Probability of the most probable task state."""
+        return float(self.probabilities.max())
+
+
+# --- questions and answers ------------------------------------------------------------------------
+
+
+class Ask(Message):
+    """A question without arguments (`health`, `describe`, `settings`)."""
+
+    SCHEMA = "ask"
+
+
+class Refusal(Message):
+    """The answer to a question that could not be answered."""
+
+    SCHEMA = "refusal"
+
+    reason: str
+    """What was wrong, what was expected, what to do."""
+
+
+class Health(Message):
+    """How a process is."""
+
+    SCHEMA = "health"
+
+    healthy: bool
+    """True when it does what it is for."""
+    detail: str
+    """One line: what it does, or what it waits for."""
+    uptime_s: float
+    """Since the process started."""
+    loop_rate_hz: float
+    """Messages and timers handled per second, over the last second."""
+    cpu_s: float
+    """Processor time used since the process started."""
+    received: dict[str, int]
+    """Messages received, per schema."""
+    sent: dict[str, int]
+    """Messages sent, per schema."""
+    lost: dict[str, int]
+    """Messages missing in the sequence numbers of their sources, per schema."""
+    refused: dict[str, int]
+    """Messages refused (malformed, unknown schema or version, another model's), per schema."""
+    late: dict[str, int]
+    """Messages that came too late to be used, per schema."""
+
+
+class Description(Message):
+    """What a process is."""
+
+    SCHEMA = "description"
+
+    version: str
+    """Of the software."""
+    publishes: tuple[str, ...]
+    """Key expressions."""
+    subscribes: tuple[str, ...]
+    """Key expressions."""
+    answers: tuple[str, ...]
+    """Key expressions."""
+    facts: dict[str, str]
+    """What else is worth knowing, e.g. `model`, `model_hash`, `gestemes`, `active_model`."""
+
+
+class SettingsReport(Message):
+    """The settings in force."""
+
+    SCHEMA = "settings_report"
+
+    settings: dict[str, Any]
+    """Field name to value, as in the service's settings file."""
+
+
+class LastStepsQuestion(Message):
+    """Asks the input device for steps again."""
+
+    SCHEMA = "last_steps_question"
+
+    count: Annotated[int, Field(gt=0, le=10_000)]
+    """At most so many."""
+    before: Count | None = None
+    """Only steps with an index below this; None for the newest."""
+
+
+class LastSteps(Message):
+    """The last steps, oldest first."""
+
+    SCHEMA = "last_steps"
+
+    clock: Name
+    """Boot of the input device."""
+    steps: tuple[Step, ...]
+    """Consecutive, oldest first."""
+    origins: tuple[Origin, ...]
+    """The operator sample that completed each step, as many as steps."""
+
+
+class LoadModel(Message):
+    """Asks a recognizer process to work with another model file."""
+
+    SCHEMA = "load_model"
+
+    path: str
+    """Of the model file, as the asked process sees it."""
+
+
+class ActivateRecognizer(Message):
+    """Asks the fixture controller to follow another recognizer's belief."""
+
+    SCHEMA = "activate_recognizer"
+
+    model: Name
+    """The `{model}` of its keys."""
+
+
+class Done(Message):
+    """The answer to a request that was carried out."""
+
+    SCHEMA = "done"
+
+    detail: str
+    """One line: what is so now."""
+
+
+MESSAGES: tuple[type[Message], ...] = (
+    Motion,
+    Step,
+    Evidence,
+    Belief,
+    Command,
+    FixtureState,
+    RobotState,
+    Ask,
+    Refusal,
+    Health,
+    Description,
+    SettingsReport,
+    LastStepsQuestion,
+    LastSteps,
+    LoadModel,
+    ActivateRecognizer,
+    Done,
+)
+"""Every message there is, for schemas, golden bytes and tables."""

@@ -1,0 +1,246 @@
+"""How a process lives: settings, loop, health, shutdown.
+
+A service is a class and one line, `raise SystemExit(run(TaskHmm))`. `run` waits for a router,
+constructs the service, starts it, answers `health`, `describe` and `settings` for it, announces its
+presence, and pumps the bus until SIGTERM or SIGINT.
+
+A handler that raises does not end the process: the traceback is logged, the failure counted, the
+loop goes on, and health says unhealthy until `UNHEALTHY_FOR_S` have passed without another one. A
+UserError is a mistake nobody but the user can mend: it ends the process with its message and exit
+code 2, wherever it is raised.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import logging
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, ClassVar
+
+from hmcs.bus.keys import KeyNameError
+from hmcs.bus.logs import Seldom, open_log
+from hmcs.bus.messages import Ask, Description, Health, SettingsReport
+from hmcs.bus.session import Bus, StoppedError
+from hmcs.bus.settings import ServiceSettings, as_yaml, load_settings
+from hmcs.errors import UserError
+
+__all__ = ["Service", "ServiceSettings", "UserError", "run", "serve"]
+
+UNHEALTHY_FOR_S = 10.0
+"""How long a failed handler makes a process unhealthy."""
+_PUMP_S = 0.5
+_RATE_WINDOW_S = 1.0
+
+
+class Service:
+    """A process of the stack: messages in, one call into the science, messages out."""
+
+    name: ClassVar[str]
+    """Kind of process, as in its keys, e.g. `task_hmm`."""
+    Settings: ClassVar[type[ServiceSettings]] = ServiceSettings
+
+    def __init__(self, settings: Any, bus: Bus, log: logging.Logger) -> None:
+        self.settings = settings
+        self.bus = bus
+        self.log = log
+
+    def start(self) -> None:
+        """Get ready; may ask others. When it returns the process is announced as present."""
+
+    def health(self) -> tuple[bool, str]:
+        """Return whether it does what it is for, and one line: what it does or waits for."""
+        return True, "running"
+
+    def facts(self) -> dict[str, str]:
+        """Return what else is worth knowing about it, for `describe`."""
+        return {}
+
+    def close(self) -> None:
+        """Let go of what it holds; the bus is still open, and nobody sees it as present."""
+
+
+def run(service_type: type[Service], argv: Sequence[str] | None = None) -> int:
+    """Live as a service of `service_type`; return the exit code.
+
+    0 after SIGTERM, SIGINT, `--help` or `--print-settings`; 1 where starting failed unexpectedly;
+    2 for a mistake of the user, told in one message on stderr.
+    """
+    try:
+        settings, print_only = load_settings(service_type.Settings, service_type.name, argv)
+        if print_only:
+            sys.stdout.write(as_yaml(settings))
+            return 0
+        log = open_log(f"{service_type.name}/{settings.instance}", settings.log_level, sys.stderr)
+        with _stop_on_signals() as stop:
+            return _run(service_type, settings, log, stop)
+    except (UserError, KeyNameError) as error:
+        sys.stderr.write(f"{service_type.name}: {error}\n")
+        return 2
+    except SystemExit as after_help:
+        return int(after_help.code or 0)
+
+
+def serve(
+    service_type: type[Service],
+    settings: ServiceSettings,
+    bus: Bus,
+    log: logging.Logger,
+    stopping: Callable[[], bool],
+) -> None:
+    """Live as a service on an open bus until `stopping` (after it turns true, wake the bus)."""
+    service = service_type(settings, bus, log)
+    life = _Life(service)
+    try:
+        service.start()
+        life.answer_questions()
+        presence = bus.announce(bus.keys.presence(service.name, bus.source.instance))
+        log.info("ready")
+        try:
+            while not stopping():
+                life.pump()
+        finally:
+            presence.withdraw()
+    except StoppedError:
+        pass
+    finally:
+        service.close()
+
+
+class Stop:
+    """The wish that a process ends: set once, from a signal handler or another thread."""
+
+    def __init__(self) -> None:
+        self._set = False
+        self._wake: Callable[[], None] = lambda: None
+
+    def __call__(self) -> bool:
+        """Return whether it is wished."""
+        return self._set
+
+    def set(self) -> None:
+        """Wish it."""
+        self._set = True
+        self._wake()
+
+    def wakes(self, bus: Bus) -> None:
+        """Let the wish wake `bus`."""
+        self._wake = bus.wake
+
+
+def _run(
+    service_type: type[Service], settings: ServiceSettings, log: logging.Logger, stop: Stop
+) -> int:
+    try:
+        with Bus.open(
+            settings.bus, service_type.name, settings.instance, log=log, stopping=stop
+        ) as bus:
+            stop.wakes(bus)
+            serve(service_type, settings, bus, log, stop)
+    except StoppedError:
+        pass
+    except (UserError, KeyNameError):
+        raise
+    except Exception:
+        log.exception("ended by an unexpected error")
+        return 1
+    log.info("stopped")
+    return 0
+
+
+class _Life:
+    """A service in its loop: what its health is made of."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._bus = service.bus
+        self._seldom = Seldom(service.log)
+        self._began_s = time.monotonic()
+        self._failures = 0
+        self._failed_s = -float("inf")
+        self._failure = ""
+        self._rate_hz = 0.0
+        self._counted = (self._began_s, 0)
+
+    def answer_questions(self) -> None:
+        """Answer what every service answers."""
+        self._bus.every(_RATE_WINDOW_S, self._measure_rate)
+        self._bus.answer("health", Ask, self._health)
+        self._bus.answer("describe", Ask, self._describe)
+        self._bus.answer("settings", Ask, self._settings)
+
+    def pump(self) -> None:
+        """Handle what is pending; outlive a handler that fails."""
+        try:
+            self._bus.pump(_PUMP_S)
+        except (StoppedError, UserError):
+            raise
+        except Exception as error:
+            self._failures += 1
+            self._failed_s = time.monotonic()
+            self._failure = f"{type(error).__name__}: {error}"
+            self._seldom.warning(
+                self._failure, "a handler failed: going on", exc_info=True, failures=self._failures
+            )
+
+    def _measure_rate(self) -> None:
+        then_s, then = self._counted
+        now_s, now = time.monotonic(), self._bus.counters.handled
+        self._rate_hz = (now - then) / (now_s - then_s)
+        self._counted = (now_s, now)
+
+    def _health(self, _: Ask) -> Health:
+        healthy, detail = self._service.health()
+        now_s = time.monotonic()
+        if now_s - self._failed_s < UNHEALTHY_FOR_S:
+            healthy = False
+            detail = f"a handler failed ({self._failures} in all), see the log: {self._failure}"
+        counters = self._bus.counters
+        return Health(
+            healthy=healthy,
+            detail=detail,
+            uptime_s=now_s - self._began_s,
+            loop_rate_hz=self._rate_hz,
+            cpu_s=time.process_time(),
+            received=dict(counters.received),
+            sent=dict(counters.sent),
+            lost=dict(counters.lost),
+            refused=dict(counters.refused),
+            late=dict(counters.late),
+        )
+
+    def _describe(self, _: Ask) -> Description:
+        bus = self._bus
+        return Description(
+            version=importlib.metadata.version("hmcs"),
+            publishes=tuple(bus.publishes),
+            subscribes=tuple(bus.subscribes),
+            answers=tuple(bus.answers),
+            facts=self._service.facts(),
+        )
+
+    def _settings(self, _: Ask) -> SettingsReport:
+        return SettingsReport(settings=self._service.settings.model_dump(mode="json"))
+
+
+@contextmanager
+def _stop_on_signals() -> Iterator[Stop]:
+    stop = Stop()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = {name: signal.signal(name, on_signal) for name in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield stop
+    finally:
+        for name, handler in before.items():
+            signal.signal(name, handler)

@@ -1,0 +1,375 @@
+"""Zenoh behind typed messages: open, publish, subscribe, ask, answer, presence.
+
+Whatever arrives on Zenoh's threads is only put into a mailbox. Decoding, counting, refusing and
+every handler run in the one thread that calls `Bus.pump`, so a service needs no locks.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import secrets
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from types import TracebackType
+from typing import Generic, Self, TypeVar
+
+import zenoh
+
+from hmcs.bus.config import BusSettings
+from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
+from hmcs.bus.counters import Counters
+from hmcs.bus.keys import Keys, check_name
+from hmcs.bus.logs import Seldom
+from hmcs.bus.loop import Loop
+from hmcs.bus.mailbox import Arrival, EveryOne, Mailbox, NewestWins
+from hmcs.bus.messages import Envelope, Message, Origin, Source
+from hmcs.bus.qos import STANCES, Stance
+from hmcs.bus.questions import (
+    Answer,
+    RequestRefusedError,
+    read_answers,
+    replies_until_done,
+    reply,
+)
+from hmcs.bus.reading import Reader, Received
+from hmcs.bus.timers import NS_PER_S, Timer, Timers
+from hmcs.bus.wire import encode
+
+__all__ = [
+    "Answer",
+    "Bus",
+    "BusSettings",
+    "BusUnavailableError",
+    "Publisher",
+    "Received",
+    "RequestRefusedError",
+    "StoppedError",
+    "Timer",
+    "Token",
+]
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+T = TypeVar("T")
+
+
+class Publisher(Generic[M]):
+    """Publishes one type of message on one key; made by `Bus.publisher`."""
+
+    def __init__(
+        self,
+        publisher: zenoh.Publisher,
+        stamp: Callable[[Origin | None], Envelope],
+        counters: Counters,
+        sender: bytes,
+    ) -> None:
+        self._publisher = publisher
+        self._stamp = stamp
+        self._counters = counters
+        self._sender = sender
+
+    def put(self, body: M, origin: Origin | None = None) -> Envelope:
+        """Publish `body`; returns the envelope it got.
+
+        While there is no router the message is discarded, and its receivers will miss its number.
+        """
+        envelope = self._stamp(origin)
+        self._publisher.put(encode(body, envelope), attachment=self._sender)
+        self._counters.sent[body.SCHEMA] += 1
+        return envelope
+
+    @property
+    def matching(self) -> bool:
+        """Whether anybody subscribes to it now."""
+        # The status itself is always truthy; its annotation as a bool is Zenoh's mistake.
+        return bool(getattr(self._publisher.matching_status, "matching"))  # noqa: B009
+
+
+class Token:
+    """A liveliness token: others see its key until it is withdrawn or this process is gone."""
+
+    def __init__(self, token: zenoh.LivelinessToken) -> None:
+        self._token: zenoh.LivelinessToken | None = token
+
+    def withdraw(self) -> None:
+        """Take it back; a second time does nothing."""
+        if self._token is not None:
+            self._token.undeclare()  # type: ignore[no-untyped-call]
+            self._token = None
+
+
+class Bus:
+    """One process' place on the bus: one Zenoh session, closed by `with`."""
+
+    @classmethod
+    def open(
+        cls,
+        settings: BusSettings,
+        service: str,
+        instance: str,
+        *,
+        log: logging.Logger | None = None,
+        stopping: Callable[[], bool] = lambda: False,
+    ) -> Self:
+        """Wait for a router and join its bus, saying every few seconds what is being waited for.
+
+        Once `stopping` is true, StoppedError is raised here, in `ask` and in `alive`, and `pump`
+        returns.
+        Raises BusUnavailableError after `settings.connect_timeout_s` where that is set, and
+        KeyNameError for a service or instance name that cannot be part of a key.
+        """
+        check_name("service", service)
+        check_name("instance", instance)
+        log = log or logging.getLogger("hmcs.bus")
+        session = connect(settings, log, stopping)
+        return cls(session, settings, service, instance, log, stopping)
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        settings: BusSettings,
+        service: str,
+        instance: str,
+        log: logging.Logger,
+        stopping: Callable[[], bool],
+    ) -> None:
+        self.settings = settings
+        self.keys = Keys(settings.cell)
+        self.source = Source(service=service, instance=instance, boot=secrets.token_hex(6))
+        self.counters = Counters()
+        self.publishes: list[str] = []
+        self.subscribes: list[str] = []
+        self.answers: list[str] = []
+        self._session = session
+        self._log = log
+        self._stopping = stopping
+        self._seldom = Seldom(log)
+        self._reader = Reader(self.counters, self._seldom)
+        self._mailbox = Mailbox()
+        self._timers = Timers()
+        self._loop = Loop(self._mailbox, self._timers, self.counters, stopping)
+        self._numbers: defaultdict[str, itertools.count[int]] = defaultdict(itertools.count)
+        # Zenoh undeclares what nobody holds.
+        self._declared: list[object] = []
+
+        def link_event(event: zenoh.TransportEvent) -> None:
+            # Told by the event: what the session says of itself lags behind it.
+            peer, opened = str(event.transport.zid), event.kind == zenoh.SampleKind.PUT
+            self._mailbox.put(lambda: self._link_changed(peer, opened))
+
+        self._declared.append(
+            session.info.declare_transport_events_listener(_on_thread(link_event))
+        )
+        self._links = {str(zid) for zid in self._reached()}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the bus; a second time does nothing."""
+        if not self._session.is_closed():
+            self._session.close()  # type: ignore[no-untyped-call]
+
+    @property
+    def connected(self) -> bool:
+        """Whether the router (or, in direct mode, anybody) is reached now."""
+        return bool(self._reached())
+
+    def _reached(self) -> list[zenoh.ZenohId]:
+        info = self._session.info
+        return [*info.routers_zid(), *(info.peers_zid() if self.settings.direct else ())]
+
+    # --- publish and subscribe --------------------------------------------------------------------
+
+    def publisher(self, message_type: type[M], key: str) -> Publisher[M]:
+        """Return a publisher of `message_type` on `key`, with the stance of the table in `qos`."""
+        stance = _stance(message_type)
+        publisher = self._session.declare_publisher(
+            key,
+            priority=getattr(zenoh.Priority, stance.priority.upper()),
+            congestion_control=getattr(zenoh.CongestionControl, stance.congestion.upper()),
+            reliability=getattr(zenoh.Reliability, stance.reliability.upper()),
+            express=False,
+        )
+        self.publishes.append(key)
+        sender = self.source.boot.encode()
+        return Publisher(publisher, self._stamps(key), self.counters, sender)
+
+    def subscribe(
+        self, message_type: type[M], key: str, handler: Callable[[Received[M]], None]
+    ) -> None:
+        """Hand every message on `key` to `handler`, or the newest of each key: see `qos`.
+
+        What is no message of `message_type` is refused, counted and logged.
+        """
+        newest_wins = _stance(message_type).delivery == "newest_wins"
+        # Each subscription follows sequence numbers by itself: it sees every message anew.
+        reader = Reader(self.counters, self._seldom)
+
+        def handle(arrival: Arrival) -> None:
+            received = reader.read(message_type, arrival, newest_wins=newest_wins)
+            if received is not None:
+                handler(received)
+
+        box = (
+            NewestWins(self._mailbox, handle)
+            if newest_wins
+            else EveryOne(self._mailbox, handle, lambda: reader.overflowed(key))
+        )
+
+        def arrive(sample: zenoh.Sample) -> None:
+            now_ns = time.monotonic_ns()
+            sender = sample.attachment.to_bytes() if sample.attachment is not None else b""
+            box.arrive(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns, sender))
+
+        self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
+        self.subscribes.append(key)
+
+    # --- questions --------------------------------------------------------------------------------
+
+    def answer(self, verb: str, question_type: type[Q], handler: Callable[[Q], Message]) -> None:
+        """Answer questions of `question_type` on this process' key of `verb`.
+
+        Where `handler` raises RequestRefusedError or UserError the asker gets a Refusal with its
+        message; any other exception refuses as well and then leaves `pump`.
+        """
+        key = self.keys.rpc(self.source.service, self.source.instance, verb)
+        stamps = self._stamps(key)
+
+        def arrive(query: zenoh.Query) -> None:
+            self._mailbox.put(
+                lambda: reply(query, key, question_type, handler, self._reader, stamps)
+            )
+
+        self._declared.append(self._session.declare_queryable(key, _on_thread(arrive)))
+        self.answers.append(key)
+
+    def ask(
+        self, key: str, question: Message, answer_type: type[M], timeout_s: float = 1.0
+    ) -> list[Answer[M]]:
+        """Ask whoever answers on `key` and return every reply that came within `timeout_s`.
+
+        Returns early once all have replied, at once where nobody is there. This process' own
+        answers are left out. Replies that cannot be read are refused and counted.
+        Raises RequestRefusedError where `key` names one process and that refused, and StoppedError
+        where the process is told to stop meanwhile.
+        """
+        payload = encode(question, self._stamps(key)())
+
+        def get(handler: zenoh.handlers.Callback[zenoh.Reply]) -> None:
+            self._session.get(
+                key,
+                handler,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                allowed_destination=zenoh.Locality.REMOTE,
+                timeout=timeout_s,
+                payload=payload,
+            )
+
+        samples = replies_until_done(get, self._stopping)
+        return read_answers(samples, key, answer_type, self._reader, self._log)
+
+    # --- presence ---------------------------------------------------------------------------------
+
+    def announce(self, key: str) -> Token:
+        """Show `key` to everybody who watches, until it is withdrawn or this process is gone."""
+        token = Token(self._session.liveliness().declare_token(key))
+        self._declared.append(token)
+        return token
+
+    def watch(self, key: str, handler: Callable[[str, bool], None]) -> None:
+        """Call `handler` with each token's key as it comes (True) or goes (False).
+
+        Those already there come first. A token that is only confirmed is not told again.
+        """
+        living: set[str] = set()
+
+        def change(token: str, alive: bool) -> None:
+            if alive != (token in living):
+                (living.add if alive else living.discard)(token)
+                handler(token, alive)
+
+        def arrive(sample: zenoh.Sample) -> None:
+            token, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._mailbox.put(lambda: change(token, alive))
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(key, _on_thread(arrive), history=True)
+        )
+
+    def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
+        """Return the keys of the tokens on `key` that are there now, sorted."""
+        samples = replies_until_done(
+            lambda handler: self._session.liveliness().get(key, handler, timeout=timeout_s),
+            self._stopping,
+        )
+        return sorted({str(sample.key_expr) for sample in samples})
+
+    # --- the loop ---------------------------------------------------------------------------------
+
+    def every(self, period_s: float, handler: Callable[[], None]) -> Timer:
+        """Call `handler` at a fixed rate, first after one period; missed ticks are skipped."""
+        if not period_s > 0:
+            raise ValueError(f"period_s is {period_s}, expected a positive number of seconds")
+        period_ns = max(1, round(period_s * NS_PER_S))
+        return self._timers.add(time.monotonic_ns() + period_ns, Timer(handler, period_ns))
+
+    def at(self, monotonic_ns: int, handler: Callable[[], None]) -> Timer:
+        """Call `handler` once, when the local monotonic clock reaches `monotonic_ns`."""
+        return self._timers.add(monotonic_ns, Timer(handler, None))
+
+    def pump(self, timeout_s: float) -> int:
+        """Handle what is pending, in order of arrival, and timers when they are due.
+
+        Waits at most `timeout_s` for something to do; returns how many things were handled. An
+        exception of a handler leaves `pump`; whatever else is pending stays for the next call.
+        """
+        return self._loop.pump(timeout_s)
+
+    def wake(self) -> None:
+        """Let a waiting `pump` look around at once; from any thread or a signal handler."""
+        self._mailbox.wake()
+
+    def _stamps(self, key: str) -> Callable[..., Envelope]:
+        numbers = self._numbers[key]
+        source = self.source
+
+        def stamp(origin: Origin | None = None) -> Envelope:
+            return Envelope(source=source, seq=next(numbers), origin=origin)
+
+        return stamp
+
+    def _link_changed(self, peer: str, opened: bool) -> None:
+        was_connected = bool(self._links)
+        (self._links.add if opened else self._links.discard)(peer)
+        if bool(self._links) != was_connected:
+            self._log.warning(
+                "connected again" if opened else "connection lost: going on by itself",
+                extra={"router": self.settings.router},
+            )
+
+
+def _stance(message_type: type[Message]) -> Stance:
+    try:
+        return STANCES[message_type]
+    except KeyError:
+        raise ValueError(
+            f"{message_type.__name__} is not published: it has no stance in hmcs.bus.qos "
+            f"(those that have: {', '.join(sorted(m.__name__ for m in STANCES))})"
+        ) from None
+
+
+def _on_thread(callback: Callable[[T], None]) -> zenoh.handlers.Callback[T]:
+    """Return a Zenoh handler that calls `callback` on the thread that received."""
+    return zenoh.handlers.Callback(callback, indirect=False)

@@ -1,0 +1,1 @@
+"""Recognition of intent: arrays in, arrays out; no wire, no clock, no process."""

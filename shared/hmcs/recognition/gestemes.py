@@ -1,0 +1,198 @@
+"""Gesteme models in parallel: every gesteme scored for every living segment start (thesis 4.1.1).
+
+A gesteme is a left-right Gaussian HMM whose phases observe where the hand is relative to the
+segment's origin and which way it goes. What a pair (gesteme, start s) makes of step t is a pure
+function of steps s..t: it depends on no other pair, no task and no other classifier, to the bit.
+Shapes: G gestemes, N phases (the longest gesteme's; shorter ones are padded with impossible
+phases), D axes looked at, F = 2·D observed dimensions, p living pairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int32]
+
+
+class GestemeParameters(NamedTuple):
+    """The left-right Gaussian HMMs of all gestemes of a model."""
+
+    means: Array
+    """Displacement from the segment's origin, m, then unit direction, shape (G, N, F)."""
+    variances: Array
+    """Of the same, shape (G, N, F)."""
+    initial: Array
+    """P(phase at the segment's first step), shape (G, N); zero in padding."""
+    stay: Array
+    """P(same phase at the next step), shape (G, N)."""
+    advance: Array
+    """P(next phase), shape (G, N)."""
+    skip: Array
+    """P(the phase after the next), shape (G, N)."""
+    leave: Array
+    """P(the segment is over), shape (G, N); the four sum to one in each phase."""
+
+
+class Scoring(NamedTuple):
+    """How likelihoods become evidence; the same for all gestemes of a model."""
+
+    background: float
+    """Log density that counts as ratio zero, nats."""
+    temperature: float
+    """The log-likelihood ratio is divided by it: successive steps share their errors, so their
+    evidence counts for less than independent observations would."""
+    window_steps: int
+    """A start older than this is dropped."""
+    prune_nats: float
+    """A pair whose running ratio falls below minus this is dropped."""
+
+
+class StepEvidence(NamedTuple):
+    """What gesteme models make of one step: a sparse list of living (gesteme, start) pairs."""
+
+    step: int
+    """t."""
+    gestemes: tuple[int, ...]
+    """Indices into the model of the gestemes held, with or without a living pair."""
+    pair_gesteme: Integers
+    """Index into the model, shape (p,)."""
+    pair_start: Integers
+    """Start step s, shape (p,); pairs are ordered by start, then gesteme."""
+    exit: Array
+    """P(leaving before step t | steps s..t−1), 0 for s = t, shape (p,)."""
+    log_ratio: Array
+    """Tempered log-likelihood ratio of step t to the background given no exit, shape (p,)."""
+
+
+class GestemeBank:
+    """Scores the gestemes it holds, step by step."""
+
+    def __init__(
+        self,
+        parameters: GestemeParameters,
+        scoring: Scoring,
+        axes: Sequence[int],
+        held: Sequence[int],
+    ) -> None:
+        """Hold the gestemes with the indices `held`; look at the `axes` of positions only."""
+        self._parameters = parameters
+        self._scoring = scoring
+        self._axes = list(axes)
+        # A dimension each, (F, G, N): see `_log_emissions`.
+        self._means = np.ascontiguousarray(np.moveaxis(parameters.means, 2, 0))
+        self._precisions = np.ascontiguousarray(np.moveaxis(1.0 / parameters.variances, 2, 0))
+        with np.errstate(divide="ignore"):
+            log_possible = np.where(_possible(parameters), 0.0, -np.inf)
+        self._log_scale = (
+            -0.5 * np.log(2.0 * np.pi * parameters.variances).sum(axis=2) + log_possible
+        )
+        self._held = np.array(sorted(held), dtype=np.int32)
+        phases = parameters.means.shape[1]
+        self._gesteme = np.zeros(0, dtype=np.int32)
+        self._start = np.zeros(0, dtype=np.int32)
+        self._phase = np.zeros((0, phases))
+        self._origin = np.zeros((0, len(self._axes)))
+        self._running = np.zeros(0)
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Indices of the gestemes held."""
+        return tuple(int(g) for g in self._held)
+
+    def step(self, index: int, position: Array, displacement: Array) -> StepEvidence:
+        """Score step `index` from `position` (3,) by `displacement` (3,), m.
+
+        Steps come in order, without gaps.
+        """
+        here, move = position[self._axes], displacement[self._axes]
+        gesteme, start, phase, exit_probability = self._predict(index)
+        origin = np.concatenate([self._origin, np.repeat(here[None, :], len(self._held), axis=0)])
+        running = np.concatenate([self._running, np.zeros(len(self._held))])
+
+        length = float(np.sqrt((move**2).sum()))
+        direction = move / length if length > 0 else np.zeros_like(move)
+        log_emission = self._log_emissions(gesteme, here + move - origin, direction)
+        top = log_emission.max(axis=1)
+        joint = phase * np.exp(log_emission - top[:, None])
+        total = np.maximum(joint.sum(axis=1), 1e-300)
+        log_ratio = (top + np.log(total) - self._scoring.background) / self._scoring.temperature
+        running += log_ratio
+
+        living = (running > -self._scoring.prune_nats) & (
+            start > index - self._scoring.window_steps
+        )
+        self._gesteme, self._start, self._origin = gesteme[living], start[living], origin[living]
+        self._running, self._phase = running[living], (joint / total[:, None])[living]
+        return StepEvidence(
+            index,
+            self.held,
+            self._gesteme,
+            self._start,
+            exit_probability[living],
+            log_ratio[living],
+        )
+
+    def replaced(self, fresh: GestemeBank, keep: Sequence[int]) -> GestemeBank:
+        """Return a bank with the pairs of the gestemes `keep` of this one and all of `fresh`.
+
+        `fresh` has been shown the same last steps; it holds none of `keep`.
+        """
+        bank = GestemeBank(
+            self._parameters, self._scoring, self._axes, sorted({*keep, *fresh.held})
+        )
+        mine = np.isin(self._gesteme, list(keep))
+        gesteme = np.concatenate([self._gesteme[mine], fresh._gesteme])
+        start = np.concatenate([self._start[mine], fresh._start])
+        order = np.lexsort((gesteme, start))
+        bank._gesteme, bank._start = gesteme[order], start[order]
+        bank._phase = np.concatenate([self._phase[mine], fresh._phase])[order]
+        bank._origin = np.concatenate([self._origin[mine], fresh._origin])[order]
+        bank._running = np.concatenate([self._running[mine], fresh._running])[order]
+        return bank
+
+    def _log_emissions(self, gesteme: Integers, where: Array, direction: Array) -> Array:
+        """Return the log density of what each pair observed in each phase, shape (p, N).
+
+        `where` is each pair's displacement from its origin, (p, D); `direction`, (D,), is the same
+        for all, so its share is worked out once a gesteme. Dimension by dimension: one sum over a
+        short last axis takes four times as long.
+        """
+        axes = len(self._axes)
+        shared = self._log_scale.copy()
+        for f, component in enumerate(direction, start=axes):
+            shared -= 0.5 * (component - self._means[f]) ** 2 * self._precisions[f]
+        distance = np.zeros((len(gesteme), shared.shape[1]))
+        for f, column in enumerate(where.T):
+            term = column[:, None] - self._means[f].take(gesteme, axis=0)
+            term *= term
+            term *= self._precisions[f].take(gesteme, axis=0)
+            distance += term
+        distance *= -0.5
+        distance += shared.take(gesteme, axis=0)
+        return distance
+
+    def _predict(self, index: int) -> tuple[Integers, Integers, Array, Array]:
+        """Move every pair's phases one step on, given no exit, and start a pair per gesteme."""
+        p = self._parameters
+        leaving = (self._phase * p.leave[self._gesteme]).sum(axis=1)
+        moved = self._phase * p.stay[self._gesteme]
+        moved[:, 1:] += (self._phase * p.advance[self._gesteme])[:, :-1]
+        moved[:, 2:] += (self._phase * p.skip[self._gesteme])[:, :-2]
+        moved /= np.maximum(1.0 - leaving, 1e-12)[:, None]
+        count = len(self._held)
+        return (
+            np.concatenate([self._gesteme, self._held]),
+            np.concatenate([self._start, np.full(count, index, dtype=np.int32)]),
+            np.concatenate([moved, p.initial[self._held]]),
+            np.concatenate([np.minimum(leaving, 1.0), np.zeros(count)]),
+        )
+
+
+def _possible(parameters: GestemeParameters) -> NDArray[np.bool_]:
+    chain = parameters.stay + parameters.advance + parameters.skip + parameters.leave
+    return np.asarray(chain > 0)

@@ -1,0 +1,221 @@
+"""Hidden Markov models: evaluation, decoding and learning (thesis 2.1.2), in logarithms.
+
+Shapes: N states, T observations, F observation dimensions. A structural zero is a probability of
+exactly zero (log −inf); learning keeps it (thesis 2.1.2, left-right topologies).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class ImpossibleSequenceError(ValueError):
+    """An observation sequence that the model gives no probability; names the first such step."""
+
+
+class GaussianHmm(NamedTuple):
+    """An HMM with diagonal Gaussian emissions (2.14 with one mixture component)."""
+
+    initial: Array
+    """π, shape (N,)."""
+    transition: Array
+    """A[i, j] = P(state j next | state i), shape (N, N). A row may sum to less than one: what is
+    missing is the probability of leaving the model."""
+    means: Array
+    """Shape (N, F)."""
+    variances: Array
+    """Shape (N, F)."""
+
+
+class Smoothed(NamedTuple):
+    """Posteriors over hidden states given a whole observation sequence."""
+
+    states: Array
+    """γ: P(state i at t | all observations), shape (T, N)."""
+    transitions: Array
+    """Σ_t ξ: expected number of transitions i to j, shape (N, N)."""
+    log_likelihood: float
+    """log P(observations)."""
+
+
+class Learned(NamedTuple):
+    """A model and how it came to be."""
+
+    model: GaussianHmm
+    log_likelihoods: tuple[float, ...]
+    """Of all sequences, before each iteration and after the last."""
+
+
+def log_gaussians(means: Array, variances: Array, observations: Array) -> Array:
+    """Return log N(observation; mean, diag variance), shape (T, N)."""
+    difference = observations[:, None, :] - means[None, :, :]
+    terms = difference**2 / variances + np.log(2.0 * np.pi * variances)
+    return np.asarray(-0.5 * terms.sum(axis=2))
+
+
+def forward(initial: Array, transition: Array, log_emission: Array) -> Array:
+    """Return log α, shape (T, N): the joint log P(o_1..o_t, state i at t) (2.5 as a joint).
+
+    `log_emission` is log P(o_t | state i), shape (T, N).
+    """
+    log_transition = _log(transition)
+    log_alpha = np.empty_like(log_emission)
+    log_alpha[0] = _log(initial) + log_emission[0]
+    for t in range(1, len(log_emission)):
+        log_alpha[t] = (
+            _log_sum(log_alpha[t - 1][:, None] + log_transition, axis=0) + log_emission[t]
+        )
+    return log_alpha
+
+
+def backward(transition: Array, log_emission: Array) -> Array:
+    """Return log β, shape (T, N): log P(o_{t+1}..o_T | state i at t)."""
+    log_transition = _log(transition)
+    log_beta = np.zeros_like(log_emission)
+    for t in range(len(log_emission) - 2, -1, -1):
+        log_beta[t] = _log_sum(
+            log_transition + (log_emission[t + 1] + log_beta[t + 1])[None, :], axis=1
+        )
+    return log_beta
+
+
+def log_likelihood(initial: Array, transition: Array, log_emission: Array) -> float:
+    """Return log P(o_1..o_T)."""
+    return float(_log_sum(forward(initial, transition, log_emission)[-1], axis=0))
+
+
+def smooth(initial: Array, transition: Array, log_emission: Array) -> Smoothed:
+    """Return the posteriors over states and transitions given the whole sequence.
+
+    Raises ImpossibleSequenceError when the sequence has no probability under the model.
+    """
+    log_alpha = forward(initial, transition, log_emission)
+    log_beta = backward(transition, log_emission)
+    total = float(_log_sum(log_alpha[-1], axis=0))
+    if not np.isfinite(total):
+        dead = int(np.argmax(~np.isfinite(log_alpha).any(axis=1)))
+        raise ImpossibleSequenceError(
+            f"the sequence is impossible under the model from its observation {dead} on: "
+            "check structural zeros and emission floors"
+        )
+    log_transition = _log(transition)
+    log_xi = (
+        log_alpha[:-1, :, None]
+        + log_transition[None, :, :]
+        + (log_emission[1:] + log_beta[1:])[:, None, :]
+        - total
+    )
+    return Smoothed(
+        np.exp(log_alpha + log_beta - total),
+        np.exp(log_xi).sum(axis=0),
+        total,
+    )
+
+
+def viterbi(
+    initial: Array, transition: Array, log_emission: Array
+) -> tuple[NDArray[np.int64], float]:
+    """Return the most probable state path, shape (T,), and its joint log probability."""
+    log_transition = _log(transition)
+    steps = len(log_emission)
+    best = _log(initial) + log_emission[0]
+    came_from = np.zeros(log_emission.shape, dtype=np.int64)
+    for t in range(1, steps):
+        candidates = best[:, None] + log_transition
+        came_from[t] = candidates.argmax(axis=0)
+        best = candidates.max(axis=0) + log_emission[t]
+    path = np.empty(steps, dtype=np.int64)
+    path[-1] = int(best.argmax())
+    for t in range(steps - 1, 0, -1):
+        path[t - 1] = came_from[t, path[t]]
+    return path, float(best.max())
+
+
+def baum_welch(
+    model: GaussianHmm,
+    sequences: Sequence[Array],
+    *,
+    max_iterations: int = 20,
+    tolerance: float = 1e-4,
+    variance_floor: float = 1e-6,
+    learn_chain: bool = True,
+) -> Learned:
+    """Return the model re-estimated from several observation sequences, each of shape (T, F).
+
+    Numerators and denominators are summed over sequences. Stops when the log-likelihood rises by
+    less than `tolerance`, or after `max_iterations`. With `learn_chain` false only means and
+    variances are learned and the initial and transition probabilities stay.
+    Raises ImpossibleSequenceError when a sequence has no probability under the model.
+    """
+    history: list[float] = []
+    for _ in range(max_iterations):
+        stats = [_statistics(model, sequence) for sequence in sequences]
+        history.append(sum(s[0].log_likelihood for s in stats))
+        if len(history) > 1 and history[-1] - history[-2] < tolerance:
+            return Learned(model, tuple(history))
+        model = _maximize(model, stats, variance_floor, learn_chain)
+    history.append(
+        sum(
+            log_likelihood(
+                model.initial,
+                model.transition,
+                log_gaussians(model.means, model.variances, sequence),
+            )
+            for sequence in sequences
+        )
+    )
+    return Learned(model, tuple(history))
+
+
+def _statistics(model: GaussianHmm, sequence: Array) -> tuple[Smoothed, Array]:
+    emission = log_gaussians(model.means, model.variances, sequence)
+    return smooth(model.initial, model.transition, emission), sequence
+
+
+def _maximize(
+    model: GaussianHmm,
+    stats: Sequence[tuple[Smoothed, Array]],
+    variance_floor: float,
+    learn_chain: bool,
+) -> GaussianHmm:
+    initial, transition = model.initial, model.transition
+    if learn_chain:
+        initial = np.mean([s.states[0] for s, _ in stats], axis=0)
+        counts = np.sum([s.transitions for s, _ in stats], axis=0)
+        leaving = counts.sum(axis=1, keepdims=True)
+        stays_inside = transition.sum(axis=1, keepdims=True)
+        transition = np.where(
+            leaving > 0, counts / np.maximum(leaving, 1e-300) * stays_inside, transition
+        )
+    weight = np.sum([s.states.sum(axis=0) for s, _ in stats], axis=0)[:, None]
+    seen = weight > 1e-12
+    safe = np.where(seen, weight, 1.0)
+    means = np.where(seen, np.sum([s.states.T @ o for s, o in stats], axis=0) / safe, model.means)
+    spread = np.sum(
+        [
+            np.einsum("tn,tnf->nf", s.states, (o[:, None, :] - means[None, :, :]) ** 2)
+            for s, o in stats
+        ],
+        axis=0,
+    )
+    variances = np.where(seen, np.maximum(spread / safe, variance_floor), model.variances)
+    return GaussianHmm(initial, transition, means, variances)
+
+
+def _log(probabilities: Array) -> Array:
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(probabilities))
+
+
+def _log_sum(values: Array, axis: int) -> Array:
+    top = values.max(axis=axis, keepdims=True)
+    safe = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        total = np.log(np.exp(values - safe).sum(axis=axis, keepdims=True)) + safe
+    return np.asarray(total.squeeze(axis=axis))

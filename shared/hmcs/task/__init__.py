@@ -1,0 +1,45 @@
+"""The task: gestemes, task states and their order, workspace, robot, fixture.
+
+A task is written in YAML (`hmcs/tasks/` holds those that come along) and read with `load_task`.
+What each field means stands in `parts`, what the parts must agree on in `model`.
+"""
+
+from hmcs.task.file import (
+    Problem,
+    TaskFileError,
+    check_task,
+    find_task,
+    format_problems,
+    load_task,
+    shipped_tasks,
+)
+from hmcs.task.model import Task
+from hmcs.task.parts import (
+    Drawings,
+    FixtureSetup,
+    Gesteme,
+    Obstacle,
+    Recognition,
+    RobotSetup,
+    State,
+    Workspace,
+)
+
+__all__ = [
+    "Drawings",
+    "FixtureSetup",
+    "Gesteme",
+    "Obstacle",
+    "Problem",
+    "Recognition",
+    "RobotSetup",
+    "State",
+    "Task",
+    "TaskFileError",
+    "Workspace",
+    "check_task",
+    "find_task",
+    "format_problems",
+    "load_task",
+    "shipped_tasks",
+]

@@ -1,0 +1,195 @@
+"""The feed hands on every step once and in order, whatever the wire does."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmcs.bus.keys import Keys
+from hmcs.bus.messages import Envelope, LastSteps, LastStepsQuestion, Origin, Source, Step
+from hmcs.bus.session import Answer, Received
+from hmcs.bus.step_feed import TAKEOVER_S, StepFeed
+
+MOVE = np.array([0.01, 0.0, 0.0])
+S = 1_000_000_000
+
+
+def step(index: int) -> Step:
+    return Step(index=index, position=index * MOVE, displacement=MOVE)
+
+
+class FakeBus:
+    """What a feed needs of a bus; `kept` are the steps the input device can be asked for."""
+
+    def __init__(self, kept: range = range(0), boot: str = "boot-1") -> None:
+        self.keys = Keys("cell")
+        self.kept, self.boot, self.questions = kept, boot, []
+        self.refused: Counter[str] = Counter()
+        self.counters = SimpleNamespace(count_refused=self._count_refused)
+        self.heard: Callable[[Received[Step]], None] = lambda _: None
+        self.now_ns = 0
+
+    def _count_refused(self, schema: str, reason: str) -> None:
+        self.refused[schema] += 1
+
+    def subscribe(self, _type: Any, key: str, handler: Callable[[Received[Step]], None]) -> None:
+        assert key == self.keys.step
+        self.heard = handler
+
+    def ask(
+        self, key: str, question: LastStepsQuestion, _type: Any, timeout_s: float
+    ) -> list[Answer[LastSteps]]:
+        self.questions.append(question)
+        indices = [i for i in self.kept if question.before is None or i < question.before]
+        chosen = indices[-question.count :]
+        origin = Origin(boot=self.boot, seq=0, captured_ns=0)
+        body = LastSteps(
+            clock=self.boot,
+            steps=tuple(step(i) for i in chosen),
+            origins=(origin,) * len(chosen),
+        )
+        return [Answer(Envelope(source=self.source(), seq=0), body)]
+
+    def source(self, instance: str = "a", boot: str | None = None) -> Source:
+        return Source(service="input_device", instance=instance, boot=boot or self.boot)
+
+    def hear(self, index: int, instance: str = "a", boot: str | None = None) -> None:
+        envelope = Envelope(source=self.source(instance, boot), seq=index)
+        self.heard(Received(step(index), envelope, self.now_ns, self.keys.step))
+
+
+class Listener:
+    """A feed on a fake bus, and what it handed on: ("restart", index) and ("step", index)."""
+
+    def __init__(self, bus: FakeBus, memory_steps: int = 5) -> None:
+        self.told: list[tuple[str, int]] = []
+        self.clocks: list[str] = []
+        self.feed = StepFeed(
+            bus,  # type: ignore[arg-type]
+            logging.getLogger("test"),
+            lambda fed: self._on_step(fed.step.index, fed.clock),
+            lambda index: self.told.append(("restart", index)),
+            memory_steps=memory_steps,
+        )
+        self.feed.begin()
+
+    def _on_step(self, index: int, clock: str) -> None:
+        self.told.append(("step", index))
+        self.clocks.append(clock)
+
+    @property
+    def steps(self) -> list[int]:
+        return [index for kind, index in self.told if kind == "step"]
+
+
+def test_who_is_there_from_the_beginning_gets_every_step_after_one_start() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    for index in range(4):
+        bus.hear(index)
+    assert listener.told == [("restart", 0), *(("step", k) for k in range(4))]
+    assert not bus.refused
+
+
+def test_who_comes_late_is_given_the_last_steps_first_and_none_of_them_twice() -> None:
+    bus = FakeBus(kept=range(20))
+    listener = Listener(bus, memory_steps=5)
+    assert listener.told == [("restart", 15), *(("step", k) for k in range(15, 20))]
+    for index in (18, 19, 20, 21):
+        bus.hear(index)
+    assert listener.steps == list(range(15, 22))
+    assert not bus.refused
+
+
+def test_missed_steps_are_fetched_before_it_goes_on() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.kept = range(9)
+    bus.hear(8)
+    assert listener.told == [("restart", 0), *(("step", k) for k in range(9))]
+    assert (bus.questions[-1].count, bus.questions[-1].before) == (7, 8)
+
+
+def test_a_gap_that_cannot_be_filled_is_a_new_beginning() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.hear(5)
+    bus.hear(6)
+    assert listener.told[-3:] == [("restart", 5), ("step", 5), ("step", 6)]
+
+
+def test_a_gap_that_can_be_filled_in_part_begins_anew_with_that_part() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.kept = range(6, 9)
+    bus.hear(9)
+    assert listener.told[-5:] == [("restart", 6), *(("step", k) for k in range(6, 10))]
+
+
+@pytest.mark.parametrize("again", [0, 2, 3])
+def test_a_step_that_repeats_or_jumps_back_is_refused_and_counted(again: int) -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    for index in range(4):
+        bus.hear(index)
+    bus.hear(again)
+    assert bus.refused["step"] == 1
+    bus.hear(4)
+    assert listener.steps == [0, 1, 2, 3, 4]
+
+
+def test_an_input_device_that_starts_anew_starts_the_listener_anew() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.hear(1)
+    bus.boot = "boot-2"
+    bus.hear(0)
+    assert listener.told[-2:] == [("restart", 0), ("step", 0)]
+    assert listener.clocks == ["boot-1", "boot-1", "boot-2"]
+
+
+def test_a_second_input_device_is_refused_while_the_first_is_alive_and_heard_after_it() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.hear(0, instance="b", boot="other")
+    assert bus.refused["step"] == 1
+    assert listener.steps == [0]
+    bus.now_ns = round((TAKEOVER_S + 0.1) * S)
+    bus.hear(0, instance="b", boot="other")
+    assert listener.clocks == ["boot-1", "other"]
+
+
+@given(
+    joined=st.integers(0, 12),
+    heard=st.lists(st.integers(0, 25), max_size=30),
+    memory=st.integers(1, 8),
+)
+def test_steps_are_consecutive_between_restarts_whatever_is_heard(
+    joined: int, heard: list[int], memory: int
+) -> None:
+    bus = FakeBus(kept=range(joined))
+    listener = Listener(bus, memory)
+    for index in heard:
+        bus.kept = range(max(joined, index))
+        bus.hear(index)
+    expected = None
+    for kind, index in listener.told:
+        assert expected is None or index >= expected
+        if kind == "step":
+            assert index == expected
+            expected = index + 1
+        else:
+            expected = index

@@ -1,0 +1,132 @@
+"""Demonstration files: read back bit by bit, and every mistake told with its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from hmcs.errors import UserError
+from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv, write_csv
+
+finite = st.floats(-1e6, 1e6, allow_nan=False)
+
+
+@given(
+    times=st.lists(finite, min_size=2, max_size=20, unique=True),
+    data=st.data(),
+)
+def test_what_is_written_is_read_back_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory, times: list[float], data: st.DataObject
+) -> None:
+    count = len(times)
+    labels = st.sampled_from([None, "reach", "a-1", "with, comma"])
+    demonstration = Demonstration(
+        "d.csv",
+        np.array(sorted(times)),
+        data.draw(arrays(float, (count, 3), elements=finite)),
+        tuple(data.draw(st.lists(labels, min_size=count, max_size=count))),
+    )
+    file = tmp_path_factory.mktemp("csv") / "d.csv"
+    write_csv(file, demonstration)
+    back = read_csv(file)
+    assert back.name == demonstration.name
+    np.testing.assert_array_equal(back.time_s, demonstration.time_s)
+    np.testing.assert_array_equal(back.positions, demonstration.positions)
+    assert back.states == demonstration.states
+
+
+def test_two_dimensions_lie_in_the_plane_z_0(tmp_path: Path) -> None:
+    file = tmp_path / "flat.csv"
+    file.write_text("time_s,x_m,y_m\n0,1,2\n1,3,4\n")
+    np.testing.assert_array_equal(read_csv(file).positions, [[1, 2, 0], [3, 4, 0]])
+
+
+def test_windows_files_with_a_mark_and_empty_lines_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "w.csv"
+    text = "\ufefftime_s,x_m,y_m,state\r\n0,1,2,a\r\n\r\n1,3,4,\r\n"
+    file.write_bytes(text.encode())
+    assert read_csv(file).states == ("a", None)
+
+
+GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "said"),
+    [
+        (b"", 1, "empty"),
+        (b"\n  \n", 1, "empty"),
+        (b"0,0,0\n1,1,1\n", 1, "header is missing"),
+        (b"time_s,x_m,y_m,zz_m\n0,0,0,0\n", 1, "unknown column 'zz_m'"),
+        (b"time_s,x_m\n0,0\n1,1\n", 1, "1 dimension"),
+        (b"time_s,x_m,y_m,z_m,w_m\n", 1, "unknown column 'w_m'"),
+        (b"x_m,y_m,time_s\n0,0,0\n", 1, "the columns are"),
+        (b"time_s,x_m,y_m,y_m\n0,0,0,0\n1,0,0,0\n", 1, "header must be"),
+        (GOOD.encode() + b"2,2,2\n", 4, "3 field(s), expected 4"),
+        (GOOD.encode() + b"2,2,2,2,2\n", 4, "5 field(s), expected 4"),
+        (GOOD.encode() + b"2,2,nan,2\n", 4, "y_m is nan"),
+        (GOOD.encode() + b"2,2,2,-inf\n", 4, "z_m is -inf"),
+        (GOOD.encode() + b"2,two,2,2\n", 4, "x_m is 'two'"),
+        (GOOD.encode() + b"2,,2,2\n", 4, "x_m is ''"),
+        (GOOD.encode() + b"1,2,2,2\n", 4, "times must rise"),
+        (GOOD.encode() + b"0.5,2,2,2\n", 4, "times must rise"),
+        (b"time_s,x_m,y_m\n0,0,0\n", None, "one sample only"),
+        (b"time_s,x_m,y_m\n", None, "no sample"),
+        (GOOD.encode() + b"2,\xff\xfe,2,2\n", 4, "not UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", 1, "not UTF-8"),
+        (GOOD.encode() + b"2,\x00,2,2\n", 4, "binary"),
+        ("time_s,x_m,y_m\n0,½,0\n1,0,0\n".encode(), 2, "x_m is '½'"),
+        (b'time_s,x_m,y_m\n0,"0,0\n1,0,0\n', 3, "not a CSV file"),
+    ],
+)
+def test_a_mistake_is_told_with_file_and_line(
+    tmp_path: Path, content: bytes, line: int | None, said: str
+) -> None:
+    file = tmp_path / "bad.csv"
+    file.write_bytes(content)
+    with pytest.raises(DemonstrationError) as caught:
+        read_csv(file)
+    where = f"{file}:{line}: " if line else f"{file}: "
+    assert str(caught.value).startswith(where), str(caught.value)
+    assert said in str(caught.value)
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_make_anything_but_a_demonstration_or_its_error(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    file = tmp_path_factory.mktemp("fuzz") / "x.csv"
+    file.write_bytes(content)
+    with pytest.raises(DemonstrationError):
+        read_csv(file)
+
+
+@given(st.text(alphabet='0123456789.,-e\n nainf"state_xymz', max_size=80))
+def test_no_rows_make_anything_but_finite_rising_samples_or_an_error(
+    tmp_path_factory: pytest.TempPathFactory, rows: str
+) -> None:
+    file = tmp_path_factory.mktemp("fuzz") / "x.csv"
+    file.write_text("time_s,x_m,y_m,state\n" + rows)
+    try:
+        demonstration = read_csv(file)
+    except DemonstrationError:
+        return
+    assert (np.diff(demonstration.time_s) > 0).all()
+    assert np.isfinite(demonstration.positions).all()
+
+
+def test_a_file_that_is_not_there_or_a_folder_is_a_users_mistake(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.csv", tmp_path):
+        with pytest.raises(UserError, match="cannot be read"):
+            read_csv(path)
+
+
+def test_a_file_that_cannot_be_written_is_a_users_mistake(tmp_path: Path) -> None:
+    demonstration = Demonstration("d", np.arange(2.0), np.zeros((2, 3)), (None, None))
+    with pytest.raises(DemonstrationError, match="cannot be written"):
+        write_csv(tmp_path / "none" / "d.csv", demonstration)

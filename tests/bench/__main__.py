@@ -1,0 +1,23 @@
+"""All figures in full: `make bench`, about ten minutes on two cores."""
+
+from __future__ import annotations
+
+from bench import accuracy, messages, step_to_belief, stops, two_hops, whole_stack
+from bench.figures import tell
+
+
+def main() -> int:
+    """Measure and tell all of them; return 1 where a goal was missed."""
+    reached = [
+        tell(str(messages.__doc__), messages.measure(5000)),
+        tell(str(two_hops.__doc__), two_hops.measure(20.0)),
+        tell(str(step_to_belief.__doc__), step_to_belief.measure(2000)),
+        tell(str(whole_stack.__doc__), whole_stack.measure(20.0)),
+        tell(str(accuracy.__doc__), accuracy.measure()),
+        tell(str(stops.__doc__), stops.measure(25)),
+    ]
+    return 0 if all(reached) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,138 @@
+"""The stack in containers: built and brought up once, looked at through its router."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hmcs.bus.config import BusSettings
+from hmcs.bus.session import Bus
+
+ROOT = Path(__file__).parents[2]
+BUILD_TIMEOUT_S = 900
+COMMAND_TIMEOUT_S = 120
+LABEL = "com.docker.compose"
+
+
+class Containers:
+    """One compose project of the stack, reached at a port of its own."""
+
+    def __init__(self, compose: list[str], port: int) -> None:
+        self.project = f"hmcs-test-{secrets.token_hex(3)}"
+        self.cell = "container-test"
+        self.router = f"tcp/127.0.0.1:{port}"
+        self._compose = [*compose, "--project-name", self.project]
+        self._environment = {
+            **os.environ,
+            "HMCS_ROUTER_PORT": str(port),
+            "HMCS_CELL": self.cell,
+            # On a machine that also builds and starts containers, late is not yet missing.
+            "HMCS_DEADLINE_MS": "500",
+        }
+
+    def compose(self, *words: str, timeout_s: float = COMMAND_TIMEOUT_S) -> str:
+        return run([*self._compose, *words], timeout_s, self._environment)
+
+    def docker(self, *words: str) -> str:
+        return run(["docker", *words], COMMAND_TIMEOUT_S, self._environment)
+
+    def ids(self, service: str | None = None) -> list[str]:
+        """Every container of the project, or of one service; also those that have ended."""
+        filters = [f"label={LABEL}.project={self.project}"]
+        filters += [f"label={LABEL}.service={service}"] if service else []
+        words = [word for each in filters for word in ("--filter", each)]
+        return self.docker("ps", "--all", "--quiet", *words).split()
+
+    def states(self) -> dict[str, dict[str, Any]]:
+        """Docker's `State` of every container, by name."""
+        found = json.loads(self.docker("inspect", *self.ids()))
+        return {container["Name"].lstrip("/"): container["State"] for container in found}
+
+    def logs(self) -> str:
+        return self.compose("logs", "--no-color", "--tail=20")
+
+
+def run(command: list[str], timeout_s: float, environment: dict[str, str]) -> str:
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+    )
+    if done.returncode:
+        said = (done.stdout + done.stderr)[-4000:]
+        pytest.fail(f"{' '.join(command)}: exit code {done.returncode}:\n{said}", pytrace=False)
+    return done.stdout
+
+
+def why_no_docker() -> str:
+    """Say in one line why Docker cannot be used here; nothing where it can."""
+    if shutil.which("docker") is None:
+        return "there is no docker command"
+    try:
+        info = subprocess.run(["docker", "info"], capture_output=True, timeout=30, check=False)
+    except subprocess.TimeoutExpired:
+        return "the Docker engine does not answer"
+    if info.returncode:
+        return "no Docker engine answers"
+    return "" if compose_command() else "there is neither docker compose nor docker-compose"
+
+
+def compose_command() -> list[str]:
+    plugin = ["docker", "compose"]
+    if subprocess.run([*plugin, "version"], capture_output=True, check=False).returncode == 0:
+        return plugin
+    return ["docker-compose"] if shutil.which("docker-compose") else []
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+@pytest.fixture(scope="session")
+def containers() -> Iterator[Containers]:
+    """The stack, built and up; taken down with its volumes afterwards, whatever happened."""
+    if reason := why_no_docker():
+        pytest.skip(f"Docker cannot run here: {reason}")
+    stack = Containers(compose_command(), free_port())
+    stack.compose("build", timeout_s=BUILD_TIMEOUT_S)
+    try:
+        stack.compose("up", "--detach", "--no-build")
+        yield stack
+    finally:
+        stack.compose("down", "--volumes", "--timeout", "3")
+
+
+@pytest.fixture
+def bus(containers: Containers) -> Iterator[Bus]:
+    """A place on the bus of the containers, outside of them."""
+    settings = BusSettings(router=containers.router, cell=containers.cell, connect_timeout_s=30)
+    with Bus.open(settings, "observer", "container-test") as bus:
+        yield bus
+
+
+@pytest.fixture
+def pump_until(bus: Bus, containers: Containers) -> Callable[..., None]:
+    """Handle what comes from the bus until a condition holds; fails after a while."""
+
+    def pump(condition: Callable[[], Any], within_s: float = 60.0) -> None:
+        deadline_s = time.monotonic() + within_s
+        while not condition():
+            assert time.monotonic() < deadline_s, f"not in time; logs:\n{containers.logs()}"
+            bus.pump(0.05)
+
+    return pump

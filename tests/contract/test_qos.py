@@ -1,0 +1,58 @@
+"""The table of transport stances is whole and keeps its rules."""
+
+from __future__ import annotations
+
+from hmcs.bus.messages import (
+    MESSAGES,
+    ActivateRecognizer,
+    Ask,
+    Command,
+    Description,
+    Done,
+    Evidence,
+    Health,
+    LastSteps,
+    LastStepsQuestion,
+    LoadModel,
+    Motion,
+    Refusal,
+    SettingsReport,
+    Step,
+)
+from hmcs.bus.qos import STANCES, Stance
+
+BY_QUERY = {
+    Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
+    ActivateRecognizer, Done,
+}  # fmt: skip
+
+
+def test_every_message_is_published_with_a_stance_or_travels_by_query() -> None:
+    assert set(STANCES) | BY_QUERY == set(MESSAGES)
+    assert not set(STANCES) & BY_QUERY
+
+
+def test_every_stance_has_a_reason() -> None:
+    for message_type, stance in STANCES.items():
+        assert len(stance.reason.split()) >= 5, message_type
+        assert stance.reason.endswith("."), message_type
+
+
+def test_no_stance_can_be_express_with_drop() -> None:
+    assert "express" not in Stance._fields
+
+
+def test_nothing_on_a_loop_blocks_its_sender() -> None:
+    assert {stance.congestion for stance in STANCES.values()} == {"drop"}
+
+
+def test_what_moves_the_robot_goes_first_and_is_never_queued_up() -> None:
+    for message_type in (Motion, Command):
+        assert STANCES[message_type].priority == "real_time"
+        assert STANCES[message_type].delivery == "newest_wins"
+
+
+def test_what_recognition_counts_on_comes_complete() -> None:
+    for message_type in (Step, Evidence):
+        assert STANCES[message_type].delivery == "every_one"
+        assert STANCES[message_type].reliability == "reliable"

@@ -1,0 +1,59 @@
+"""What the README shows runs as it stands there."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from hmcs.bus.messages import ActivateRecognizer, Done
+from hmcs.motion.steps import Step
+from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import LayeredRecognizer
+from hmcs_local.processes import StackProcess
+from support.hand import Scene
+from support.stack import CELL, Stack, clean_environment
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def start_of_readme(stack: Stack, folder: Path, model_file: Path) -> StackProcess:
+    """Start the README's recognizer from the file it says to save it in."""
+    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    script = folder / "my_recognizer.py"
+    script.write_text(code, encoding="utf-8")
+    instance = "readme"
+    place = ("--router", stack.endpoint, "--cell", CELL, "--instance", instance)
+    process = StackProcess(
+        "my_recognizer",
+        instance,
+        [sys.executable, str(script), "--model", str(model_file), *place],
+        clean_environment(),
+        folder / "readme.log",
+        stop_grace_s=5.0,
+    )
+    stack.processes.append(process)
+    return process
+
+
+def test_the_recognizer_in_the_readme_recognizes_and_can_be_activated(
+    scene: Scene, model_file: Path, model: Model, steps: list[Step], tmp_path: Path
+) -> None:
+    stack = scene.stack
+    mine = start_of_readme(stack, tmp_path, model_file)
+    fixture = stack.start("fixture_controller", "f", "--models", model_file)
+    stack.until_ready(mine, fixture)
+
+    scene.in_step(steps[:250])
+    best = LayeredRecognizer(model)
+    expected = [int(best.step(step).belief.states.argmax()) for step in steps[:250]]
+    found = [int(r.body.probabilities.argmax()) for r in scene.watcher.beliefs]
+    assert np.mean(np.array(found) == expected) > 0.6
+
+    key = scene.bus.keys.rpc("fixture_controller", "f", "activate")
+    stack.until(lambda: stack.health(fixture).received.get("belief", 0) >= 250)
+    (answer,) = scene.bus.ask(key, ActivateRecognizer(model="most-alike"), Done)
+    assert answer.body.detail == f"follows most-alike {model.hash}"
+    assert mine.stop() == 0

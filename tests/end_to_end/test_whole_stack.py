@@ -1,0 +1,112 @@
+"""The whole stack on human motion: the robot goes where the hand goes, lent a ruler on the way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hmcs.motion.steps import Step
+from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import LayeredRecognizer
+from support.hand import Watcher
+from support.stack import Stack
+
+SPAN_S = 10.0
+"""How much of the performance is watched: two shapes and a switch between them."""
+
+PATIENT = ("--input-stale-after-ms", 500, "--command-valid-for-ms", 500)
+"""The way is looked at here, not the stops: a machine that stands still a moment is no fault."""
+
+Perform = Callable[..., Watcher]
+
+
+@pytest.fixture
+def perform(stack: Stack, performance_file: Path) -> Perform:
+    """Bring up a whole stack and let the operator perform for a while; returns what was seen."""
+
+    def run(*model_files: Path) -> Watcher:
+        bus = stack.open_bus("observer", "o")
+        stack.watch(bus)
+        watcher = Watcher(bus)
+        models = [("--model", file) for file in model_files]
+        stack.until_ready(
+            stack.start("robot", "r", "--hang-s", 0.5),
+            stack.start(
+                "fixture_controller",
+                "f",
+                *("--models", json.dumps([str(f) for f in model_files])),
+                *PATIENT,
+            ),
+            *(stack.start("gesteme_classifier", c, *model) for model in models for c in "ab"),
+            *(stack.start("task_hmm", "t", *model, "--deadline-ms", 80) for model in models),
+        )
+        stack.bring_up(
+            "input_device",
+            "i",
+            *("--source", "recorded", "--demonstration", performance_file, "--rate-hz", 100),
+            *("--lead-in-s", 0.5, "--wait-for", '["robot", "fixture_controller"]'),
+        )
+        stack.until(lambda: watcher.motions and watcher.motions[-1].body.dead_man)
+        stack.elapse(SPAN_S)
+        for process in stack.processes[1:]:
+            health = stack.health(process)
+            assert health.healthy, health.detail
+            assert (health.refused, health.lost) == ({}, {}), process.service
+        return watcher
+
+    return run
+
+
+def ways(watcher: Watcher) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the hand and the tool went, each from its start, m, both of shape (T, 3).
+
+    A tool position belongs to the sample whose command the robot was following then.
+    """
+    hand = {r.envelope.seq: r.body.position for r in watcher.motions}
+    pairs = [
+        (hand[r.envelope.origin.seq], r.body.tool_position)
+        for r in watcher.robot
+        if r.envelope.origin is not None and r.envelope.origin.seq in hand
+    ]
+    there, here = (np.array(column) for column in zip(*pairs, strict=True))
+    assert np.ptp(there, axis=0).max() > 0.2, "the hand has gone a good way"
+    return there - there[0], here - here[0]
+
+
+def test_without_recognition_the_robot_goes_exactly_where_the_hand_goes(perform: Perform) -> None:
+    watcher = perform()
+    hand, tool = ways(watcher)
+    off_m = np.linalg.norm(tool - hand, axis=1)
+    # A process that waits for a processor makes the tool lag for a moment; nothing may add up.
+    assert np.sqrt((off_m**2).mean()) < 0.002
+    assert off_m[-1] < 0.005
+    assert {r.body.reason for r in watcher.fixture if r.body.engaged} == {"no_belief"}
+
+
+def test_with_recognition_it_is_guided_along_the_way_of_the_hand(
+    perform: Perform, model_file: Path, model: Model, steps: list[Step]
+) -> None:
+    watcher = perform(model_file)
+    hand, tool = ways(watcher)
+    # Guidance takes from the velocity across the learned path, never turns it around.
+    assert np.linalg.norm(tool - hand, axis=1).max() < 0.05
+    engaged = [r.body for r in watcher.fixture if r.body.engaged]
+    assert np.mean([state.reason == "guiding" for state in engaged]) > 0.9
+    assert {"write-g", "write-n"} <= {state.state for state in engaged}
+    assert not any(r.body.contacts for r in watcher.robot)
+
+    beliefs = [r.body for r in watcher.beliefs]
+    recognizer = LayeredRecognizer(model)
+    expected = [recognizer.step(step).belief.states for step in steps[: len(beliefs)]]
+    assert [belief.step for belief in beliefs] == list(range(len(beliefs)))
+    agree = [
+        belief.likely_state == model.state_names[int(states.argmax())]
+        for belief, states in zip(beliefs, expected, strict=True)
+    ]
+    # The device samples the demonstration anew at its own rate: its steps are not quite these.
+    assert np.mean(agree) > 0.95

@@ -1,0 +1,47 @@
+"""A stale command stops the robot, and only a deliberate re-engage sets it in motion again."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from support.stack import Stack
+from support.stops import KINDS, FastLoop, How, Victim
+
+TRIALS = 3
+
+
+@pytest.fixture(scope="module")
+def fast_loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FastLoop]:
+    folder: Path = tmp_path_factory.mktemp("fast-loop")
+    with Stack(folder) as stack:
+        yield FastLoop(stack, folder, np.random.default_rng(7))
+
+
+@pytest.mark.parametrize(("victim", "how"), KINDS)
+def test_the_robot_stands_in_time_and_moves_again_only_when_re_engaged(
+    fast_loop: FastLoop, victim: Victim, how: How
+) -> None:
+    for _ in range(TRIALS):
+        trial = fast_loop.trial(victim, how)
+        assert trial.good, trial
+
+
+def test_a_robot_that_hung_stands_until_re_engaged(fast_loop: FastLoop) -> None:
+    fast_loop.until_moving()
+    stack, watcher, robot = fast_loop.stack, fast_loop.watcher, fast_loop.robot
+    robot.send(signal.SIGSTOP)
+    stack.elapse(0.2)
+    watcher.robot.clear()
+    watcher.motions.clear()
+    robot.send(signal.SIGCONT)
+    stack.until(lambda: any(np.any(r.body.reference_twist) for r in watcher.robot))
+
+    assert watcher.robot[0].body.stop == "stale_command"
+    moved_ns = next(r.received_ns for r in watcher.robot if np.any(r.body.reference_twist))
+    assert any(r.received_ns < moved_ns and not r.body.dead_man for r in watcher.motions)
+    assert stack.health(robot).healthy

@@ -1,0 +1,1 @@
+"""What tests over a real router share: processes, a hand, somebody who watches."""

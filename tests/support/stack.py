@@ -1,0 +1,190 @@
+"""A router on a free port and real processes around it, all of them ended with the `with`."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from hmcs.bus.keys import Member
+from hmcs.bus.messages import Ask, Health
+from hmcs.bus.session import Bus, BusSettings
+from hmcs_local.processes import StackProcess
+from hmcs_local.stack import with_free_port
+
+CELL = "test"
+DEADLINE_S = 15.0
+"""What has not come about after so long never will."""
+_LOOK_S = 0.003
+
+
+class Stack:
+    """Processes on one router. The router is a process of its own, so that it can be killed.
+
+    Buses opened here are pumped while `until` waits; nothing else reads the clock.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.endpoint = with_free_port("tcp/127.0.0.1:0")
+        self.processes: list[StackProcess] = []
+        self.present: set[Member] = set()
+        """Who is there and ready, once `watch` was called."""
+        self._buses: list[Bus] = []
+        self._contexts = contextlib.ExitStack()
+        self.router: StackProcess
+
+    def __enter__(self) -> Self:
+        try:
+            self.start_router()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close every bus and kill every process; all has been told that the tests want to hear."""
+        self._contexts.close()
+        for process in self.processes:
+            process.send(signal.SIGKILL)
+        for process in self.processes:
+            process.wait(DEADLINE_S)
+
+    # --- processes --------------------------------------------------------------------------------
+
+    def start_router(self) -> None:
+        """Start the router, on the same port each time."""
+        self.router = self._spawn("router", "router", "hmcs.bus.router", "--listen", self.endpoint)
+
+    def start(self, service: str, instance: str, *flags: object) -> StackProcess:
+        """Start a service on this router; returns at once."""
+        return self._spawn(
+            service,
+            instance,
+            f"hmcs_{service}",
+            *("--router", self.endpoint, "--cell", CELL, "--instance", instance),
+            *flags,
+        )
+
+    def bring_up(self, service: str, instance: str, *flags: object) -> StackProcess:
+        """Start a service and wait until it is ready."""
+        process = self.start(service, instance, *flags)
+        self.until_ready(process)
+        return process
+
+    def until_ready(self, *processes: StackProcess) -> None:
+        """Wait until these are present; fail at once where one has ended instead."""
+        wanted = {Member(process.service, process.instance) for process in processes}
+
+        def ready() -> bool:
+            for process in processes:
+                assert process.running, "\n".join(process.last_lines())
+            return wanted <= self.present
+
+        self.until(ready)
+
+    def until_gone(self, process: StackProcess) -> None:
+        """Wait until nobody sees a process any more."""
+        self.until(lambda: Member(process.service, process.instance) not in self.present)
+
+    def _spawn(self, service: str, instance: str, module: str, *flags: object) -> StackProcess:
+        process = StackProcess(
+            service,
+            instance,
+            [sys.executable, "-m", module, *map(str, flags)],
+            clean_environment(),
+            self.folder / f"{len(self.processes)}-{service}-{instance}.log",
+            stop_grace_s=DEADLINE_S,
+        )
+        self.processes.append(process)
+        return process
+
+    # --- the bus ----------------------------------------------------------------------------------
+
+    def open_bus(self, service: str, instance: str) -> Bus:
+        """Open a bus in this process; it is pumped by `until` and closed at the end."""
+        settings = BusSettings(router=self.endpoint, cell=CELL, connect_timeout_s=DEADLINE_S)
+        bus = self._contexts.enter_context(Bus.open(settings, service, instance))
+        self._buses.append(bus)
+        return bus
+
+    def watch(self, bus: Bus) -> None:
+        """Follow on `bus` who is there."""
+
+        def change(key: str, alive: bool) -> None:
+            (self.present.add if alive else self.present.discard)(bus.keys.member_of(key))
+
+        bus.watch(bus.keys.presence(), change)
+
+    def pump(self) -> None:
+        """Handle whatever has arrived on the buses of this process; wait a moment for it."""
+        for bus in self._buses:
+            bus.pump(_LOOK_S / len(self._buses))
+
+    def until(self, condition: Callable[[], Any], within_s: float = DEADLINE_S) -> Any:
+        """Pump until `condition` is true and return what it gave; fail when it is not in time."""
+        deadline_s = time.monotonic() + within_s
+        while not (value := condition()):
+            assert time.monotonic() < deadline_s, f"did not come about within {within_s:g} s"
+            self.pump()
+        return value
+
+    def elapse(self, duration_s: float) -> None:
+        """Pump for a time: for what must *not* happen, or for a stream to run on."""
+        end_s = time.monotonic() + duration_s
+        while time.monotonic() < end_s:
+            self.pump()
+
+    def health(self, process: StackProcess) -> Health:
+        """Ask a process how it is."""
+        bus = self._buses[0]
+        key = bus.keys.rpc(process.service, process.instance, "health")
+        answers = bus.ask(key, Ask(), Health, timeout_s=5.0)
+        assert len(answers) == 1, f"{process.instance} gave {len(answers)} answers"
+        return answers[0].body
+
+
+def clean_environment() -> dict[str, str]:
+    """Return this process' environment without settings of HMCS, with one thread for numpy.
+
+    What tests import, the processes they start import as well.
+    """
+    kept = {key: value for key, value in os.environ.items() if not key.startswith("HMCS_")}
+    return {**kept, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parent.parent)}
+
+
+def log_events(process: StackProcess) -> list[dict[str, Any]]:
+    """Return the events a process has logged so far."""
+    lines = process.log_path.read_text(encoding="utf-8").splitlines()
+    return [json.loads(line) for line in lines if line.startswith("{")]
+
+
+def run_to_end(
+    command: Sequence[str], within_s: float = DEADLINE_S
+) -> subprocess.CompletedProcess[str]:
+    """Run `python -m …` to its end."""
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        env=clean_environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=within_s,
+        check=False,
+    )
