@@ -77,9 +77,8 @@ def test_a_second_fixture_controller_moves_nothing_until_the_first_is_gone(
     second = stack.start("fixture_controller", "second")
     stack.until_ready(second)
     stack.until(lambda: stack.health(robot).refused.get("command", 0) > 20)
-    # The robot has never stopped following the first.
-    followed = [r.body.stop for r in watcher.robot]
-    assert set(followed[followed.index("none") :]) == {"none"}
+    # The robot has never been handed over; a machine that stalls may have stopped it.
+    assert "second_writer" not in {r.body.stop for r in watcher.robot}
     assert stack.health(robot).healthy
 
     before = len(watcher.robot)

@@ -1,0 +1,1 @@
+"""Studies and figures: what recognition is worth, measured."""

@@ -1,0 +1,1 @@
+"""Any registered recognizer in one process: steps in, beliefs out."""
