@@ -20,7 +20,7 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import mean_path
 from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.gestemes import GestemeBank, GestemeParameters, Scoring
-from hmcs.recognition.hmm import GaussianHmm, baum_welch
+from hmcs.recognition.hmm.learning import GaussianHmm, baum_welch
 from hmcs.recognition.model import AXES, Model, chain_of
 from hmcs.recognition.segment_filter import FilterSettings, SegmentFilter
 from hmcs.recognition.unknown import AlarmSettings

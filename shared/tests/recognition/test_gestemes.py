@@ -5,7 +5,8 @@ import pytest
 
 from hmcs.motion.steps import steps_of
 from hmcs.recognition.gestemes import GestemeBank
-from hmcs.recognition.hmm import forward, log_gaussians
+from hmcs.recognition.hmm.emissions import log_gaussians
+from hmcs.recognition.hmm.inference import forward
 
 
 @pytest.fixture(scope="module")

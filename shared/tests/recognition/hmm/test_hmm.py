@@ -8,16 +8,15 @@ from hmmlearn.hmm import GaussianHMM
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hmcs.recognition.hmm import (
-    GaussianHmm,
+from hmcs.recognition.hmm.emissions import log_gaussians
+from hmcs.recognition.hmm.inference import (
     ImpossibleSequenceError,
-    baum_welch,
     forward,
-    log_gaussians,
     log_likelihood,
     smooth,
     viterbi,
 )
+from hmcs.recognition.hmm.learning import GaussianHmm, baum_welch
 
 
 def random_model(seed: int, states: int, dimensions: int = 2) -> GaussianHmm:
