@@ -9,12 +9,12 @@ import numpy as np
 
 from bench.figures import Figure, tell
 from hmcs.motion.chains import chained
+from hmcs.motion.lasa import read_drawing
 from hmcs.motion.steps import DeadZone
+from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.learning import learn
-from hmcs.recognition.recognizer import LayeredRecognizer
 from hmcs.recognition.scoring import NONE, Scores, midway_labels, score
 from hmcs.task import load_task
-from hmcs_trainer.lasa import read_drawing
 
 ACCURACY = 0.985
 P95_DELAY_STEPS = 2.0

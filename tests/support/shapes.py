@@ -8,11 +8,11 @@ import numpy as np
 
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.lasa import read_drawing, shapes
 from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model_file import save_model
 from hmcs.task import Task, load_task
-from hmcs_trainer.lasa import read_drawing, shapes
 
 COUNT = 25
 SHAPES = tuple(shape for shape in shapes() if not shape.startswith("Multi"))[:COUNT]

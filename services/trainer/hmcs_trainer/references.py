@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
+from hmcs.motion.lasa import read_drawing
 from hmcs.task import Task
-from hmcs_trainer.lasa import read_drawing
 
 _DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
 

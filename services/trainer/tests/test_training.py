@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hmcs.motion.demonstrations import read_csv, write_csv
+from hmcs.motion.lasa import read_drawing, shapes
 from hmcs.recognition.model_file import load_model
 from hmcs.task import load_task
 from hmcs_trainer.__main__ import main
-from hmcs_trainer.lasa import read_drawing, shapes
 
 TASK = "human-shapes"
 SHAPES = ["GShape", "NShape", "PShape", "JShape", "Snake"]

@@ -15,6 +15,7 @@ from hmcs.task.file import (
 )
 from hmcs.task.model import Task
 from hmcs.task.parts import (
+    AXES,
     Drawings,
     FixtureSetup,
     Gesteme,
@@ -26,6 +27,7 @@ from hmcs.task.parts import (
 )
 
 __all__ = [
+    "AXES",
     "Drawings",
     "FixtureSetup",
     "Gesteme",

