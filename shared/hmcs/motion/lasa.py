@@ -100,9 +100,7 @@ def _drawings(shape: str) -> tuple[Drawing, ...]:
     try:
         from scipy.io import loadmat
     except ImportError as error:
-        raise DemonstrationError(
-            f"lasa: scipy, which reads them, is missing: {_INSTALL}"
-        ) from error
+        raise DemonstrationError(f"lasa: no scipy to read them with: {_INSTALL}") from error
     data = loadmat(_folder() / f"{shape}.mat", squeeze_me=True, struct_as_record=False)
     result = []
     for drawing in data["demos"]:

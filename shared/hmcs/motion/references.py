@@ -83,7 +83,7 @@ def random_gestemes(
     gestemes: list[FloatArray] = []
     while len(gestemes) < count:
         points = random_gesteme(references, rng)
-        if not gestemes or _turn_rad(gestemes[-1], points) >= references.least_turn_rad:
+        if not gestemes or turn_rad(gestemes[-1], points) >= references.least_turn_rad:
             gestemes.append(points)
     return gestemes
 
@@ -106,6 +106,13 @@ def random_performance(
     return segments
 
 
+def turn_rad(before: FloatArray, after: FloatArray) -> float:
+    """Return the angle between the end of one gesteme and the start of the next."""
+    end, start = before[-1] - before[-2], after[1] - after[0]
+    cosine = end @ start / (np.linalg.norm(end) * np.linalg.norm(start))
+    return math.acos(min(max(cosine, -1.0), 1.0))
+
+
 def _samples(length_m: float, sample_m: float) -> FloatArray:
     return np.linspace(0.0, length_m, max(2, math.ceil(length_m / sample_m) + 1))
 
@@ -116,12 +123,6 @@ def _random_frame(dimensions: int, rng: np.random.Generator) -> tuple[FloatArray
     forward = vectors[0] / np.linalg.norm(vectors[0])
     sideways = vectors[1] - vectors[1] @ forward * forward
     return forward, sideways / np.linalg.norm(sideways)
-
-
-def _turn_rad(before: FloatArray, after: FloatArray) -> float:
-    end, start = before[-1] - before[-2], after[1] - after[0]
-    cosine = end @ start / (np.linalg.norm(end) * np.linalg.norm(start))
-    return math.acos(min(max(cosine, -1.0), 1.0))
 
 
 def _shares(follow: Mapping[str, float]) -> FloatArray:
