@@ -12,7 +12,9 @@ from hmcs.bus.messages import Evidence
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
-from hmcs.recognition.gestemes import GestemeBank, StepEvidence
+from hmcs.motion.steps import Step
+from hmcs.recognition.gestemes import StepEvidence
+from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
 from hmcs_gesteme_classifier.shares import share_of
@@ -38,15 +40,16 @@ class GestemeClassifier(Service):
         )
         self._peers_key = bus.keys.member(self._model.name, self.name)
         self._peers = {bus.source.instance}
-        self._bank = self._model.bank([])
-        self._recent: deque[FedStep] = deque(maxlen=self._model.scoring.window_steps)
+        window_steps = layers_of(self._model).scoring.window_steps
+        self._bank = bank_of(self._model, [])
+        self._recent: deque[FedStep] = deque(maxlen=window_steps)
         self._ready = False
         self._feed = StepFeed(
             bus,
             log,
             self._on_step,
             self._on_restart,
-            memory_steps=self._model.scoring.window_steps,
+            memory_steps=window_steps,
         )
 
     def start(self) -> None:
@@ -81,13 +84,13 @@ class GestemeClassifier(Service):
 
     def _on_step(self, fed: FedStep) -> None:
         self._recent.append(fed)
-        evidence = self._score(self._bank, fed)
+        evidence = self._bank.step(_step_of(fed))
         if self._ready:
             self._evidence.put(self._message(evidence, fed.clock), fed.origin)
 
     def _on_restart(self, index: int) -> None:
         self._recent.clear()
-        self._bank = self._model.bank(self._bank.held)
+        self._bank = bank_of(self._model, self._bank.held)
         self.log.info("beginning anew", extra={"step": index})
 
     def _on_peer(self, key: str, alive: bool) -> None:
@@ -113,15 +116,11 @@ class GestemeClassifier(Service):
         held = frozenset(self._bank.held)
         if wanted == held:
             return
-        fresh = self._model.bank(sorted(wanted - held))
+        fresh = bank_of(self._model, sorted(wanted - held))
         for fed in self._recent:
-            self._score(fresh, fed)
+            fresh.step(_step_of(fed))
         self._bank = self._bank.replaced(fresh, sorted(held & wanted))
         self.log.info("gestemes held", extra=self.facts() | {"peers": len(self._peers)})
-
-    def _score(self, bank: GestemeBank, fed: FedStep) -> StepEvidence:
-        step = fed.step
-        return bank.step(step.index, step.position, step.displacement)
 
     def _message(self, evidence: StepEvidence, clock: str) -> Evidence:
         names = self._model.gesteme_names
@@ -135,6 +134,10 @@ class GestemeClassifier(Service):
             exit=evidence.exit.astype(self._dtype),
             log_ratio=evidence.log_ratio.astype(self._dtype),
         )
+
+
+def _step_of(fed: FedStep) -> Step:
+    return Step(**dict(fed.step))
 
 
 def _named(wanted: tuple[str, ...], known: tuple[str, ...], model: object) -> frozenset[int]:

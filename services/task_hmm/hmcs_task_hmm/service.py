@@ -12,8 +12,9 @@ from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
 from hmcs.motion.steps import Step
+from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizer import LayeredRecognizer, Recognition, TaskRecognizer
+from hmcs.recognition.recognizer import Recognition
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
 from hmcs_task_hmm.settings import TaskHmmSettings
@@ -46,7 +47,7 @@ class TaskHmm(Service):
             log,
             self._on_step,
             self._on_restart,
-            memory_steps=self._model.scoring.window_steps,
+            memory_steps=layers_of(self._model).scoring.window_steps,
         )
 
     def start(self) -> None:
@@ -82,7 +83,7 @@ class TaskHmm(Service):
         step = fed.step
         self._clock = fed.clock
         if self._warming is not None:
-            self._warming.step(Step(step.index, step.position, step.displacement))
+            self._warming.step(Step(**dict(step)))
             self._gathering.restart(step.index + 1)
             return
         self._origins[step.index] = fed.origin

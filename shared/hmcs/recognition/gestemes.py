@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.motion.steps import Step
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
@@ -104,12 +106,10 @@ class GestemeBank:
         """Indices of the gestemes held."""
         return tuple(int(g) for g in self._held)
 
-    def step(self, index: int, position: Array, displacement: Array) -> StepEvidence:
-        """Score step `index` from `position` (3,) by `displacement` (3,), m.
-
-        Steps come in order, without gaps.
-        """
-        here, move = position[self._axes], displacement[self._axes]
+    def step(self, step: Step) -> StepEvidence:
+        """Score the next step; steps come in order, without gaps."""
+        index = step.index
+        here, move = step.position[self._axes], step.displacement[self._axes]
         gesteme, start, phase, exit_probability = self._predict(index)
         origin = np.concatenate([self._origin, np.repeat(here[None, :], len(self._held), axis=0)])
         running = np.concatenate([self._running, np.zeros(len(self._held))])

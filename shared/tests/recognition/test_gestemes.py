@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from hmcs.motion.steps import steps_of
+from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.gestemes import GestemeBank
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.hmm.inference import forward
+from hmcs.recognition.layered import bank_of, filter_of
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +17,7 @@ def steps(performances, task):
 
 
 def run(bank, steps):
-    return [bank.step(*step) for step in steps]
+    return [bank.step(step) for step in steps]
 
 
 def as_pairs(evidence):
@@ -50,21 +51,23 @@ def dense_chain(parameters, g):
 @pytest.mark.parametrize("gesteme", [0, 1, 2])
 @pytest.mark.parametrize("start", [0, 7, 25])
 def test_evidence_equals_the_forward_algorithm_of_each_gesteme_hmm(model, steps, gesteme, start):
-    lenient = model.scoring._replace(prune_nats=np.inf, window_steps=10_000)
-    evidence = run(GestemeBank(model.parameters, lenient, model.axes, range(3)), steps)
+    lenient = model.knowledge.scoring._replace(prune_nats=np.inf, window_steps=10_000)
+    evidence = run(GestemeBank(model.knowledge.parameters, lenient, model.axes, range(3)), steps)
 
-    n, A = dense_chain(model.parameters, gesteme)
+    n, A = dense_chain(model.knowledge.parameters, gesteme)
     assert A.sum(axis=1) == pytest.approx(1.0)
     moves = np.array([step.displacement for step in steps[start:]])
     observed = np.hstack(
         [np.cumsum(moves, axis=0), moves / np.linalg.norm(moves, axis=1, keepdims=True)]
     )
     emission = log_gaussians(
-        model.parameters.means[gesteme, :n], model.parameters.variances[gesteme, :n], observed
+        model.knowledge.parameters.means[gesteme, :n],
+        model.knowledge.parameters.variances[gesteme, :n],
+        observed,
     )
     # Conditioned on no exit so far, the chain inside is the forward recursion without its last
     # state; its step-wise likelihoods and leaving probabilities are what evidence must hold.
-    log_alpha = forward(model.parameters.initial[gesteme, :n], A[:n, :n], emission)
+    log_alpha = forward(model.knowledge.parameters.initial[gesteme, :n], A[:n, :n], emission)
     totals = np.logaddexp.reduce(log_alpha, axis=1)
     filtered = np.exp(log_alpha - totals[:, None])
     leaving = filtered @ A[:n, n]
@@ -78,65 +81,67 @@ def test_evidence_equals_the_forward_algorithm_of_each_gesteme_hmm(model, steps,
 
 
 def test_evidence_does_not_depend_on_what_else_is_held(model, steps):
-    whole = run(model.bank(), steps)
+    whole = run(bank_of(model), steps)
     for alone in ([0], [1], [2], [0, 2]):
-        for full, part in zip(whole, run(model.bank(alone), steps), strict=True):
+        for full, part in zip(whole, run(bank_of(model, alone), steps), strict=True):
             expected = {pair: v for pair, v in as_pairs(full).items() if pair[0] in alone}
             assert as_pairs(part) == expected
 
 
 def test_a_late_joiner_that_replays_the_window_is_equal_to_the_bit(model, steps):
-    short = model.scoring._replace(window_steps=12)
-    bank = GestemeBank(model.parameters, short, model.axes, range(3))
+    short = model.knowledge.scoring._replace(window_steps=12)
+    bank = GestemeBank(model.knowledge.parameters, short, model.axes, range(3))
     whole = run(bank, steps)
     joined_at = 30
-    late = GestemeBank(model.parameters, short, model.axes, range(3))
+    late = GestemeBank(model.knowledge.parameters, short, model.axes, range(3))
     for step in steps[joined_at - 12 + 1 : joined_at]:
-        late.step(*step)
+        late.step(step)
     for t in range(joined_at, len(steps)):
-        assert as_pairs(late.step(*steps[t])) == as_pairs(whole[t])
+        assert as_pairs(late.step(steps[t])) == as_pairs(whole[t])
 
 
 def test_gestemes_gained_by_replay_continue_as_if_they_had_always_been_held(model, steps):
-    whole = run(model.bank(), steps)
-    half = model.bank([0, 1])
+    whole = run(bank_of(model), steps)
+    half = bank_of(model, [0, 1])
     for step in steps[:20]:
-        half.step(*step)
-    fresh = model.bank([2])
+        half.step(step)
+    fresh = bank_of(model, [2])
     for step in steps[:20]:
-        fresh.step(*step)
+        fresh.step(step)
     grown = half.replaced(fresh, keep=[1])
     assert grown.held == (1, 2)
     for t in range(20, len(steps)):
-        evidence = grown.step(*steps[t])
+        evidence = grown.step(steps[t])
         expected = {pair: v for pair, v in as_pairs(whole[t]).items() if pair[0] in (1, 2)}
         assert as_pairs(evidence) == expected
         assert (np.diff(evidence.pair_start) >= 0).all()
 
 
 def test_pairs_older_than_the_window_or_hopeless_are_dropped(model, steps):
-    short = model.scoring._replace(window_steps=9)
-    for evidence in run(GestemeBank(model.parameters, short, model.axes, range(3)), steps):
+    short = model.knowledge.scoring._replace(window_steps=9)
+    for evidence in run(
+        GestemeBank(model.knowledge.parameters, short, model.axes, range(3)), steps
+    ):
         assert (evidence.pair_start > evidence.step - 9).all()
-    counts = [len(evidence.pair_start) for evidence in run(model.bank(), steps)]
+    counts = [len(evidence.pair_start) for evidence in run(bank_of(model), steps)]
     assert max(counts) < 3 * len(steps) / 2
 
 
 def test_a_classifier_with_no_living_pair_still_speaks(model):
-    bank = model.bank([0])
+    bank = bank_of(model, [0])
     away = np.array([-0.5, 0.0, 0.0])
-    evidence = [bank.step(t, t * away, away) for t in range(5)]
+    evidence = [bank.step(Step(t, t * away, away)) for t in range(5)]
     assert evidence[-1].gestemes == (0,)
     assert all(np.isfinite(item.log_ratio).all() for item in evidence)
     assert len(evidence[-1].pair_start) == 0
 
 
 def test_pruning_changes_no_belief(model, steps):
-    unpruned = model.scoring._replace(prune_nats=np.inf)
-    full = GestemeBank(model.parameters, unpruned, model.axes, range(3))
-    pruned = model.bank()
-    one, other = model.filter(), model.filter()
+    unpruned = model.knowledge.scoring._replace(prune_nats=np.inf)
+    full = GestemeBank(model.knowledge.parameters, unpruned, model.axes, range(3))
+    pruned = bank_of(model)
+    one, other = filter_of(model), filter_of(model)
     for step in steps:
         np.testing.assert_allclose(
-            one.step(full.step(*step)).states, other.step(pruned.step(*step)).states, atol=1e-6
+            one.step(full.step(step)).states, other.step(pruned.step(step)).states, atol=1e-6
         )
