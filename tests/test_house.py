@@ -19,7 +19,7 @@ TOOLS = Path(sys.executable).parent
 PACKAGES = sorted(
     [ROOT / "shared/hmcs", ROOT / "deploy/local/hmcs_local", *ROOT.glob("services/*/hmcs_*")]
 )
-FORBIDDEN_MODULES = {"pickle", "_pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve"}
+FORBIDDEN_MODULES = {"pickle", "_pickle", "cPickle", "dill", "cloudpickle", "shelve"}
 
 
 def run(*command: str | Path, **environment: str) -> str:

@@ -10,8 +10,9 @@ import pytest
 
 from hmcs.bus.messages import Belief
 from hmcs.motion.steps import Step
+from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import LayeredRecognizer, Recognition
+from hmcs.recognition.recognizer import Recognition
 from support.hand import Scene, told
 
 PATIENT = ("--deadline-ms", "1000")
@@ -81,7 +82,7 @@ def test_belief_stays_the_same_when_classifiers_are_swapped(
 def test_a_task_hmm_that_comes_back_catches_up(
     scene: Scene, model_file: Path, model: Model, steps: list[Step], made: int
 ) -> None:
-    stack, window = scene.stack, model.scoring.window_steps
+    stack, window = scene.stack, model.knowledge.scoring.window_steps
     assert 60 < window < 400
     stack.bring_up("gesteme_classifier", "a", "--model", model_file)
     first = stack.bring_up("task_hmm", "t", "--model", model_file, *PATIENT)

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import LayeredRecognizer
 from support.hand import Watcher
 from support.stack import Stack
 

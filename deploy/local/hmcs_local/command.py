@@ -171,12 +171,45 @@ def train(
     name: Annotated[
         str | None, typer.Option(help="The model's name on the bus; the task's by default.")
     ] = None,
+    recognizer: Annotated[
+        str, typer.Option(metavar="KIND", help="What to learn for; see `hmcs recognizers`.")
+    ] = "segment-filter",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A setting of the recognizer."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of what is drawn at random in learning.")] = 0,
 ) -> None:
     """Learn a model of a task from demonstrations."""
     from hmcs_trainer.training import train as learn
 
-    model = learn(task, demonstrations, output, name=name, progress=typer.echo)
-    typer.echo(f"{output}: model {model.name}")
+    model = learn(
+        task,
+        demonstrations,
+        output,
+        name=name,
+        recognizer=recognizer,
+        settings=dict(_setting(item) for item in settings or []),
+        seed=seed,
+        progress=typer.echo,
+    )
+    typer.echo(f"{output}: model {model.name} for the recognizer {model.recognizer}")
+
+
+@app.command()
+def recognizers(
+    name: Annotated[
+        str | None, typer.Argument(help="Show this one with its settings and their defaults.")
+    ] = None,
+) -> None:
+    """List the recognizers a model can be learned for, with a line and the source of each."""
+    from hmcs.recognition.recognizers import kind_named, kinds
+    from hmcs_local.recognizers import show_kind, show_kinds
+
+    if name is None:
+        show_kinds(kinds(), Console())
+    else:
+        show_kind(kind_named(name), Console())
 
 
 @task_app.command()
@@ -221,6 +254,13 @@ def _scale(item: str) -> tuple[str, int]:
     if not count.isdecimal():
         raise UserError(f"--scale {item}: write SERVICE=N, e.g. gesteme-classifier=3")
     return name, int(count)
+
+
+def _setting(item: str) -> tuple[str, str]:
+    name, equals, value = item.partition("=")
+    if not (name and equals):
+        raise UserError(f"--set {item}: write NAME=VALUE, e.g. temperature=3")
+    return name, value
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -27,6 +27,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
 from hmcs.recognition.gestemes import GestemeParameters, Scoring
+from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.segment_filter import FilterSettings
@@ -66,18 +67,21 @@ def model(name: str, length_m: float) -> Model:
         name=name,
         hash="",
         task=task(name),
-        parameters=GestemeParameters(
-            means=np.zeros((1, 2, 6)),
-            variances=np.ones((1, 2, 6)),
-            initial=np.array([[1.0, 0.0]]),
-            stay=phases,
-            advance=phases,
-            skip=phases,
-            leave=phases,
+        recognizer="segment-filter",
+        knowledge=Layers(
+            GestemeParameters(
+                means=np.zeros((1, 2, 6)),
+                variances=np.ones((1, 2, 6)),
+                initial=np.array([[1.0, 0.0]]),
+                stay=phases,
+                advance=phases,
+                skip=phases,
+                leave=phases,
+            ),
+            Scoring(0.0, 1.0, 100, 30.0),
+            FilterSettings(),
+            AlarmSettings(20, -5.0),
         ),
-        scoring=Scoring(0.0, 1.0, 100, 30.0),
-        filter_settings=FilterSettings(),
-        alarm=AlarmSettings(20, -5.0),
         path_points=(np.array([[0.0, 0, 0], [length_m, 0, 0]]),),
         path_spreads=(np.full(2, 0.005),),
         demonstrations=("made up",),

@@ -12,10 +12,10 @@ from hmcs.bus.messages import Evidence
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
-from hmcs.motion.steps import Step
 from hmcs.recognition.gestemes import StepEvidence
 from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
+from hmcs.translation import step_of
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
 from hmcs_gesteme_classifier.shares import share_of
 
@@ -84,7 +84,7 @@ class GestemeClassifier(Service):
 
     def _on_step(self, fed: FedStep) -> None:
         self._recent.append(fed)
-        evidence = self._bank.step(_step_of(fed))
+        evidence = self._bank.step(step_of(fed.step))
         if self._ready:
             self._evidence.put(self._message(evidence, fed.clock), fed.origin)
 
@@ -118,7 +118,7 @@ class GestemeClassifier(Service):
             return
         fresh = bank_of(self._model, sorted(wanted - held))
         for fed in self._recent:
-            fresh.step(_step_of(fed))
+            fresh.step(step_of(fed.step))
         self._bank = self._bank.replaced(fresh, sorted(held & wanted))
         self.log.info("gestemes held", extra=self.facts() | {"peers": len(self._peers)})
 
@@ -134,10 +134,6 @@ class GestemeClassifier(Service):
             exit=evidence.exit.astype(self._dtype),
             log_ratio=evidence.log_ratio.astype(self._dtype),
         )
-
-
-def _step_of(fed: FedStep) -> Step:
-    return Step(**dict(fed.step))
 
 
 def _named(wanted: tuple[str, ...], known: tuple[str, ...], model: object) -> frozenset[int]:

@@ -13,7 +13,7 @@ from hmcs.motion.demonstrations import Demonstration, read_csv
 from hmcs.motion.operators import Operator, OperatorStuckError, TaskSegment, perform
 from hmcs.motion.references import References, random_gesteme, random_performance
 from hmcs.recognition.model_file import load_model
-from hmcs.task import Task
+from hmcs.task import AXES, Task
 from hmcs_input_device.playback import Passes, Playback
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
@@ -22,7 +22,6 @@ from hmcs_input_device.sources import SourceFactory
 FloatArray = NDArray[np.float64]
 
 _SIMULATED_RATE_HZ = 100.0
-_AXES = {"x": 0, "y": 1, "z": 2}
 
 
 Played = Playback | ReEngaging
@@ -123,7 +122,7 @@ def _segments(
 def _random_gesteme(
     settings: InputDeviceSettings, task: Task, rng: np.random.Generator
 ) -> FloatArray:
-    axes = [_AXES[axis] for axis in task.recognition.axes]
+    axes = [AXES[axis] for axis in task.recognition.axes]
     references = References(kind=settings.primitives, dimensions=max(2, len(axes)))
     points = random_gesteme(references.scaled(settings.primitive_scale), rng)
     if len(axes) < 2:

@@ -11,10 +11,9 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
-from hmcs.motion.steps import Step
 from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizer import Recognition
+from hmcs.translation import belief_message, step_of
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
 from hmcs_task_hmm.settings import TaskHmmSettings
@@ -83,7 +82,7 @@ class TaskHmm(Service):
         step = fed.step
         self._clock = fed.clock
         if self._warming is not None:
-            self._warming.step(Step(**dict(step)))
+            self._warming.step(step_of(step))
             self._gathering.restart(step.index + 1)
             return
         self._origins[step.index] = fed.origin
@@ -112,7 +111,8 @@ class TaskHmm(Service):
                 names = self._named(recognition.belief.missing)
                 self._seldom.warning("degraded", "no evidence in time", gestemes=", ".join(names))
             step = released.evidence.step
-            self._belief.put(self._message(recognition), self._origins.pop(step, None))
+            message = belief_message(self._model, recognition, self._clock)
+            self._belief.put(message, self._origins.pop(step, None))
         self._set_timer()
 
     def _set_timer(self) -> None:
@@ -120,23 +120,6 @@ class TaskHmm(Service):
             self._timer.cancel()
         due_ns = self._gathering.due_ns
         self._timer = None if due_ns is None else self.bus.at(due_ns, self._release)
-
-    def _message(self, recognition: Recognition) -> Belief:
-        belief = recognition.belief
-        return Belief(
-            model_hash=self._model.hash,
-            clock=self._clock,
-            step=belief.step,
-            states=self._model.state_names,
-            probabilities=belief.states,
-            unknown=belief.unknown,
-            likely_gesteme=self._model.gesteme_names[belief.gesteme],
-            segment_start=belief.segment_start,
-            log_likelihood=belief.log_likelihood,
-            mean_log_likelihood=recognition.mean_log_likelihood,
-            unknown_alarm=recognition.unknown_alarm,
-            missing_gestemes=self._named(belief.missing),
-        )
 
     def _named(self, gestemes: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self._model.gesteme_names[g] for g in gestemes)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from hmcs.bus.messages import Evidence
+from hmcs.recognition.gestemes import Scoring
+from hmcs.recognition.layered import Layers
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
 
-MODEL = SimpleNamespace(
-    hash="abc", gesteme_names=("a", "b", "c"), scoring=SimpleNamespace(window_steps=10)
-)
+LAYERS = Layers(None, Scoring(0.0, 1.0, window_steps=10, prune_nats=30.0), None, None)
+MODEL = SimpleNamespace(hash="abc", gesteme_names=("a", "b", "c"), knowledge=LAYERS)
 
 
 def message(**changes):

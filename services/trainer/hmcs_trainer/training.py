@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from hmcs.bus.keys import check_name
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
+from hmcs.recognition.recognizers import DEFAULT, kind_named, settings_of
 from hmcs.task import load_task
 from hmcs_trainer.references import read_references
 
@@ -19,17 +22,29 @@ def train(
     output: str | Path,
     *,
     name: str | None = None,
+    recognizer: str = DEFAULT,
+    settings: Mapping[str, str] | None = None,
+    seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Model:
     """Learn a model of the task, a shipped one's name or a file, and write it to `output`.
 
-    The model is called `name`, or as the task is. Raises a UserError that says what is wrong with
-    the task, a reference, a demonstration or the name.
+    The model is called `name`, or as the task is. `recognizer` is the kind to learn for, with
+    `settings` of its own as text; what is random is drawn with `seed`. Raises a UserError that
+    says what is wrong with the task, a reference, a demonstration, the name, the recognizer or a
+    setting.
     """
     loaded = load_task(task)
     if name is not None:
         check_name("model", name)
     progress("reading demonstrations")
     demonstrations = read_references(references, loaded)
-    model = learn(loaded, demonstrations, progress=progress)
+    model = learn(
+        loaded,
+        demonstrations,
+        settings_of(kind_named(recognizer), settings or {}),
+        recognizer=recognizer,
+        rng=np.random.default_rng(seed),
+        progress=progress,
+    )
     return save_model(model._replace(name=name or model.name), output)

@@ -75,7 +75,9 @@ def test_a_csv_demonstration_trains_like_the_drawings_it_holds(trained, tmp_path
             references.append(str(path))
     assert main([TASK, *references, "--output", str(tmp_path / "csv.hmcs")]) == 0
     from_csv, from_drawings = load_model(tmp_path / "csv.hmcs"), load_model(trained / "m.hmcs")
-    np.testing.assert_array_equal(from_csv.parameters.means, from_drawings.parameters.means)
+    np.testing.assert_array_equal(
+        from_csv.knowledge.parameters.means, from_drawings.knowledge.parameters.means
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 """Demonstrations: recorded motion, and the CSV files it is kept in.
 
-A file has the header `time_s,x_m,y_m[,z_m][,state]` and a row a sample. Where there is no `z_m`
-the motion lies in the plane z = 0; where `state` is empty the sample carries no label.
+A file has the header
+`time_s,x_m,y_m[,z_m][,qx,qy,qz,qw][,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm][,state]` and a row a sample.
+Where there is no `z_m` the motion lies in the plane z = 0; where `state` is empty the sample
+carries no label. Orientation and wrench are there with all of their columns or none.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.errors import UserError
+from hmcs.motion.quaternions import is_unit
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -24,7 +27,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _TIME, _AXES, _STATE = "time_s", ("x_m", "y_m", "z_m"), "state"
-_HEADER = "time_s,x_m,y_m[,z_m][,state]"
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_WRENCH = ("fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm")
+_HEADER = f"time_s,x_m,y_m[,z_m][,{','.join(_QUATERNION)}][,{','.join(_WRENCH)}][,state]"
 
 
 class DemonstrationError(UserError):
@@ -42,6 +47,31 @@ class Demonstration(NamedTuple):
     """m, shape (T, 3)."""
     states: tuple[str | None, ...]
     """The task state of each sample, T of them; None where it has no label."""
+    orientations: FloatArray | None = None
+    """Of the hand, unit quaternions x y z w, shape (T, 4); None where they were not recorded."""
+    wrenches: FloatArray | None = None
+    """The operator's force, N, then torque, N·m, shape (T, 6); None where not recorded."""
+
+    @property
+    def switches(self) -> NDArray[np.bool_]:
+        """Whether a sample has another label than the one before it, shape (T,).
+
+        The first sample has one before it without a label.
+        """
+        before = (None, *self.states)
+        return np.array([own != last for own, last in zip(self.states, before, strict=False)])
+
+    def cut(self, begin: int, end: int | None) -> Demonstration:
+        """Return the samples from `begin` up to `end`, which is not among them."""
+        part = slice(begin, end)
+        return Demonstration(
+            self.name,
+            self.time_s[part],
+            self.positions[part],
+            self.states[part],
+            None if self.orientations is None else self.orientations[part],
+            None if self.wrenches is None else self.wrenches[part],
+        )
 
 
 def read_csv(path: str | Path) -> Demonstration:
@@ -49,7 +79,8 @@ def read_csv(path: str | Path) -> Demonstration:
 
     Raises DemonstrationError, naming file and line, when the file cannot be read, is empty, is no
     text, has no header or unknown columns, has a row with too few or too many fields, a number that
-    is none or is not finite, a time that does not rise, or fewer than two samples.
+    is none or is not finite, a time that does not rise, a quaternion that is no rotation, or fewer
+    than two samples.
     """
     file = Path(path)
     reader = csv.reader(io.StringIO(_text(file), newline=""), strict=True)
@@ -63,28 +94,44 @@ def read_csv(path: str | Path) -> Demonstration:
             f"{file}: {'one sample only' if rows else 'no sample'}, expected two at least below "
             "the header"
         )
-    numbers = np.array([row.numbers for row in rows])
-    positions = np.zeros((len(rows), 3))
-    positions[:, : numbers.shape[1] - 1] = numbers[:, 1:]
-    return Demonstration(file.name, numbers[:, 0], positions, tuple(row.state for row in rows))
+    table = dict(zip(columns, np.array([row.numbers for row in rows]).T, strict=False))
+    table.setdefault(_AXES[2], np.zeros(len(rows)))
+
+    def together(names: tuple[str, ...]) -> FloatArray:
+        return np.stack([table[name] for name in names], axis=1)
+
+    return Demonstration(
+        file.name,
+        table[_TIME],
+        together(_AXES),
+        tuple(row.state for row in rows),
+        together(_QUATERNION) if _QUATERNION[0] in table else None,
+        together(_WRENCH) if _WRENCH[0] in table else None,
+    )
 
 
 def write_csv(path: str | Path, demonstration: Demonstration) -> None:
     """Write a demonstration as a CSV file that `read_csv` reads back bit by bit.
 
-    The column `state` is written only where a sample has a label.
-    Raises DemonstrationError when the file cannot be written.
+    The column `state` is written only where a sample has a label, orientations and wrenches only
+    where they were recorded. Raises DemonstrationError when the file cannot be written.
     """
     labeled = any(state is not None for state in demonstration.states)
+    parts = [
+        ((_TIME,), demonstration.time_s[:, None]),
+        (_AXES, demonstration.positions),
+        (_QUATERNION, demonstration.orientations),
+        (_WRENCH, demonstration.wrenches),
+    ]
+    there = [(names, numbers) for names, numbers in parts if numbers is not None]
+    header = [name for names, _ in there for name in names]
+    table = np.hstack([numbers for _, numbers in there])
     try:
         with Path(path).open("w", encoding="utf-8", newline="") as stream:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow([_TIME, *_AXES, *([_STATE] if labeled else [])])
-            for time_s, position, state in zip(
-                demonstration.time_s, demonstration.positions, demonstration.states, strict=True
-            ):
-                numbers = [repr(float(number)) for number in (time_s, *position)]
-                writer.writerow([*numbers, *([state or ""] if labeled else [])])
+            writer.writerow([*header, *([_STATE] if labeled else [])])
+            for row, state in zip(table.tolist(), demonstration.states, strict=True):
+                writer.writerow([*map(repr, row), *([state or ""] if labeled else [])])
     except OSError as error:
         raise DemonstrationError(f"{path}: cannot be written: {error.strerror}") from error
 
@@ -120,18 +167,22 @@ def _text(file: Path) -> str:
 def _columns(file: Path, header: list[str]) -> list[str]:
     columns = [column.strip() for column in header]
     positions = [column for column in columns if column in _AXES]
-    labels = [_STATE] if columns[-1:] == [_STATE] else []
-    for axes in (_AXES[:2], _AXES):
-        if columns == [_TIME, *axes, *labels]:
-            return columns
-    known = {_TIME, *_AXES, _STATE}
+    axes = _AXES if _AXES[2] in columns else _AXES[:2]
+    senses = [sense for sense in (_QUATERNION, _WRENCH) if set(sense) & set(columns)]
+    wanted = [_TIME, *axes, *(name for sense in senses for name in sense)]
+    if columns in (wanted, [*wanted, _STATE]):
+        return columns
+    known = {_TIME, *_AXES, *_QUATERNION, *_WRENCH, _STATE}
     strangers = [column for column in columns if column not in known]
+    lacking = [name for sense in senses for name in sense if name not in columns]
     if columns[:1] != [_TIME] and _is_numbers(columns):
         what = "the header is missing"
     elif strangers:
         what = f"unknown column {', '.join(repr(column) for column in strangers)}"
     elif not set(_AXES[:2]) <= set(positions):
         what = f"positions have {len(positions)} dimension(s), expected 2 or 3"
+    elif lacking:
+        what = f"there is no column {', '.join(repr(column) for column in lacking)}"
     else:
         what = f"the columns are {','.join(columns)!r}"
     raise DemonstrationError(f"{file}:1: {what}; the header must be {_HEADER}")
@@ -140,6 +191,7 @@ def _columns(file: Path, header: list[str]) -> list[str]:
 def _rows(file: Path, reader: Reader, columns: list[str]) -> Iterator[_Row]:
     labeled = columns[-1] == _STATE
     names = columns[: len(columns) - labeled]
+    first = names.index(_QUATERNION[0]) if _QUATERNION[0] in names else None
     before_s = -math.inf
     for fields in reader:
         if not fields:
@@ -157,6 +209,11 @@ def _rows(file: Path, reader: Reader, columns: list[str]) -> Iterator[_Row]:
                 "before: times must rise"
             )
         before_s = numbers[0]
+        if first is not None and not is_unit(numbers[first : first + 4]):
+            raise DemonstrationError(
+                f"{where}: {','.join(_QUATERNION)} is {numbers[first : first + 4]}, expected a "
+                "rotation: a quaternion of length 1"
+            )
         yield _Row(numbers, (fields[-1].strip() or None) if labeled else None)
 
 

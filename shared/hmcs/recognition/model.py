@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.paths import Path
-from hmcs.task import Task
-
-AXES = {"x": 0, "y": 1, "z": 2}
+from hmcs.task import AXES, Task
 
 
 class Model(NamedTuple):

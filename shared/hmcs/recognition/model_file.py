@@ -15,20 +15,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from hmcs.errors import UserError
-from hmcs.recognition.gestemes import GestemeParameters, Scoring
+from hmcs.recognition.content import AnyArray, Content, ContentError, put_together, taken_apart
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter import FilterSettings
-from hmcs.recognition.unknown import AlarmSettings
+from hmcs.recognition.recognizers import kind_named
 from hmcs.task import Task
 
 FORMAT = "hmcs-model/1"
-RECOGNIZER = "segment-filter"
 
-_MANIFEST = "model.json"
+_MANIFEST, _ARRAYS = "model.json", "arrays/"
+_PATH, _SPREAD = "guide.path.", "guide.spread."
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -46,9 +44,8 @@ class Manifest(BaseModel):
     name: str
     hash: str
     task: Task
-    scoring: Scoring
-    filter_settings: FilterSettings
-    alarm: AlarmSettings
+    knowledge: Any
+    """Of the recognizer; where an array stands there is `{"$array": its name}`."""
     demonstrations: tuple[str, ...]
 
 
@@ -65,12 +62,13 @@ def save_model(model: Model, path: str | Path) -> Model:
     unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
-            manifest = json.dumps(_manifest(model), indent=2, sort_keys=True)
-            archive.writestr(zipfile.ZipInfo(_MANIFEST, _EPOCH), manifest)
-            for name, array in _arrays(model).items():
+            manifest, arrays = _parts(model)
+            text = json.dumps(manifest, indent=2, sort_keys=True)
+            archive.writestr(zipfile.ZipInfo(_MANIFEST, _EPOCH), text)
+            for name, array in arrays.items():
                 buffer = io.BytesIO()
                 np.save(buffer, array, allow_pickle=False)
-                archive.writestr(zipfile.ZipInfo(f"arrays/{name}.npy", _EPOCH), buffer.getvalue())
+                archive.writestr(zipfile.ZipInfo(f"{_ARRAYS}{name}.npy", _EPOCH), buffer.getvalue())
         unfinished.replace(target)
     finally:
         unfinished.unlink(missing_ok=True)
@@ -90,9 +88,11 @@ def load_model(path: str | Path) -> Model:
         with zipfile.ZipFile(source) as archive:
             fields = json.loads(archive.read(_MANIFEST))
             arrays = {
-                Path(name).stem: np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
+                name.removeprefix(_ARRAYS).removesuffix(".npy"): np.load(
+                    io.BytesIO(archive.read(name)), allow_pickle=False
+                )
                 for name in archive.namelist()
-                if name.startswith("arrays/")
+                if name.startswith(_ARRAYS)
             }
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
         raise ModelFileError(
@@ -101,7 +101,7 @@ def load_model(path: str | Path) -> Model:
     return _model(source, fields, arrays)
 
 
-def _model(source: Path, fields: Any, arrays: dict[str, NDArray[np.float64]]) -> Model:
+def _model(source: Path, fields: Any, arrays: dict[str, AnyArray]) -> Model:
     version = fields.get("format") if isinstance(fields, dict) else None
     if version != FORMAT:
         raise ModelFileError(
@@ -110,78 +110,71 @@ def _model(source: Path, fields: Any, arrays: dict[str, NDArray[np.float64]]) ->
         )
     try:
         manifest = Manifest.model_validate(fields)
-        gestemes = [gesteme.name for gesteme in manifest.task.gestemes]
-        model = Model(
-            name=manifest.name,
-            hash=manifest.hash,
-            task=manifest.task,
-            parameters=GestemeParameters(
-                **{field: arrays[field] for field in GestemeParameters._fields}
-            ),
-            scoring=manifest.scoring,
-            filter_settings=manifest.filter_settings,
-            alarm=manifest.alarm,
-            path_points=tuple(arrays[f"path_{k}"] for k in range(len(gestemes))),
-            path_spreads=tuple(arrays[f"spread_{k}"] for k in range(len(gestemes))),
-            demonstrations=manifest.demonstrations,
-        )
-    except (ValidationError, KeyError) as error:
+        kind = kind_named(manifest.recognizer)
+        count = len(manifest.task.gestemes)
+        paths = tuple(arrays.pop(f"{_PATH}{k}") for k in range(count))
+        spreads = tuple(arrays.pop(f"{_SPREAD}{k}") for k in range(count))
+        knowledge: Any = put_together(kind.knowledge, Content(manifest.knowledge, arrays))
+        kind.check(knowledge, manifest.task)
+    except KeyError as error:
+        raise ModelFileError(f"{source}: not a complete model: {error} is missing") from error
+    except (ValidationError, ContentError, ValueError) as error:
         raise ModelFileError(f"{source}: not a complete model: {error}") from error
-    _check_arrays(source, model)
+    except UserError as error:
+        raise ModelFileError(f"{source}: {error}") from error
+    model = Model(
+        name=manifest.name,
+        hash=manifest.hash,
+        task=manifest.task,
+        recognizer=manifest.recognizer,
+        knowledge=knowledge,
+        path_points=paths,
+        path_spreads=spreads,
+        demonstrations=manifest.demonstrations,
+    )
+    _check_guides(source, model)
     if _digest(model) != model.hash:
         raise ModelFileError(f"{source}: damaged, its checksum does not fit: train it again")
     return model
 
 
-def _check_arrays(source: Path, model: Model) -> None:
-    gestemes, phases = model.parameters.initial.shape[:1], model.parameters.initial.shape
-    emissions = (*phases, 2 * len(model.axes))
-    expected: dict[str, tuple[int, ...]] = {
-        field: emissions if field in ("means", "variances") else phases
-        for field in GestemeParameters._fields
-    }
-    for k, points in enumerate(model.path_points):
-        expected |= {f"path_{k}": (len(points), 3), f"spread_{k}": (len(points),)}
-    for name, array in _arrays(model).items():
-        if array.shape != expected[name] or array.dtype != np.float64:
-            raise ModelFileError(
-                f"{source}: array {name!r} is {array.dtype} of shape {array.shape}, "
-                f"expected float64 of shape {expected[name]}"
-            )
-        if not np.isfinite(array).all():
-            raise ModelFileError(f"{source}: array {name!r} holds numbers that are not finite")
-    if gestemes != (len(model.task.gestemes),) or not (model.parameters.variances > 0).all():
-        raise ModelFileError(
-            f"{source}: its arrays are for {gestemes[0]} gestemes with positive variances, "
-            f"its task has {len(model.task.gestemes)}"
-        )
+def _check_guides(source: Path, model: Model) -> None:
+    for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
+        expected = {
+            f"{_PATH}{k}": (points, (len(points), 3)),
+            f"{_SPREAD}{k}": (spread, points.shape[:1]),
+        }
+        for name, (array, shape) in expected.items():
+            if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
+                raise ModelFileError(
+                    f"{source}: array {name!r} is {array.dtype} of shape {array.shape}, "
+                    f"expected finite float64 of shape {shape}"
+                )
 
 
-def _manifest(model: Model) -> dict[str, Any]:
-    return Manifest(
+def _parts(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
+    """Return the manifest as JSON, and the arrays by name."""
+    content = taken_apart(model.knowledge)
+    arrays = dict(content.arrays)
+    for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
+        arrays |= {f"{_PATH}{k}": points, f"{_SPREAD}{k}": spread}
+    manifest = Manifest(
         format=FORMAT,
-        recognizer=RECOGNIZER,
+        recognizer=model.recognizer,
         name=model.name,
         hash=model.hash,
         task=model.task,
-        scoring=model.scoring,
-        filter_settings=model.filter_settings,
-        alarm=model.alarm,
+        knowledge=content.plain,
         demonstrations=model.demonstrations,
-    ).model_dump(mode="json")
-
-
-def _arrays(model: Model) -> dict[str, NDArray[np.float64]]:
-    arrays: dict[str, NDArray[np.float64]] = dict(model.parameters._asdict())
-    for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
-        arrays |= {f"path_{k}": points, f"spread_{k}": spread}
-    return arrays
+    )
+    return manifest.model_dump(mode="json"), arrays
 
 
 def _digest(model: Model) -> str:
+    manifest, arrays = _parts(model._replace(hash=""))
     digest = hashlib.sha256()
-    digest.update(json.dumps(_manifest(model._replace(hash="")), sort_keys=True).encode())
-    for name, array in sorted(_arrays(model).items()):
+    digest.update(json.dumps(manifest, sort_keys=True).encode())
+    for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:16]

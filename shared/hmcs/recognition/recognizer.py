@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from hmcs.motion.steps import Step
 from hmcs.recognition.segment_filter import TaskBelief
 
@@ -28,3 +30,40 @@ class Recognizer(Protocol):
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         ...
+
+
+class BadStepError(ValueError):
+    """A step that no recognizer may be shown; nothing changes by it."""
+
+
+class Guarded:
+    """Shows a recognizer only steps that are steps, in order and without gaps."""
+
+    def __init__(self, recognizer: Recognizer) -> None:
+        self._recognizer = recognizer
+        self._next: int | None = None
+
+    def step(self, step: Step) -> Recognition:
+        """Take the next step.
+
+        Raises BadStepError for a step out of order, or with a position, displacement or sense
+        that is not finite or of another shape.
+        """
+        if self._next is not None and step.index != self._next:
+            raise BadStepError(f"step {step.index} came, expected {self._next}")
+        for field, shape in _SHAPES.items():
+            value = getattr(step, field)
+            if value is None and field in _OPTIONAL:
+                continue
+            if np.shape(value) != shape or not np.isfinite(value).all():
+                raise BadStepError(
+                    f"step {step.index}: {field} is {value!r}, expected finite numbers of shape "
+                    f"{shape}"
+                )
+        recognition = self._recognizer.step(step)
+        self._next = step.index + 1
+        return recognition
+
+
+_SHAPES = {"position": (3,), "displacement": (3,), "orientation": (4,), "wrench": (6,)}
+_OPTIONAL = ("orientation", "wrench")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recognition.gestemes import StepEvidence
+from hmcs.recognition.task_chain import TaskChain
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -35,22 +36,6 @@ class FilterSettings(NamedTuple):
     """That unknown motion ends at any one step, in a new segment of any state."""
     drop_below: float = 1e-6
     """A hypothesis less probable than this is dropped."""
-
-
-class TaskChain(NamedTuple):
-    """What the filter knows of the task."""
-
-    initial: Array
-    """P(first state), shape (S,)."""
-    transition: Array
-    """P(next state | state, segment over), shape (S, S); a row that sums to less than one ends
-    the task there, and what follows is unknown motion."""
-    slot_state: Integers
-    """The state of each slot, shape (K,)."""
-    slot_gesteme: Integers
-    """The gesteme of each slot, shape (K,)."""
-    slot_share: Array
-    """P(gesteme | state) of each slot, shape (K,)."""
 
 
 class TaskBelief(NamedTuple):

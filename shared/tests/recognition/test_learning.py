@@ -5,8 +5,10 @@ import pytest
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import steps_of
-from hmcs.recognition.learning import LearningError, LearningSettings, learn, segments_of
-from hmcs.recognition.recognizer import LayeredRecognizer
+from hmcs.recognition.gesteme_learning import LearningSettings
+from hmcs.recognition.layered import LayeredRecognizer
+from hmcs.recognition.learning import learn
+from hmcs.recognition.segments import LearningError, segments_of
 
 ORDER = ["along", "round", "up", "along", "round", "up"]
 STATE = {"along": 0, "round": 1, "up": 2}
@@ -54,14 +56,14 @@ def test_motion_that_is_no_part_of_the_task_raises_the_alarm_and_the_task_does_n
 def test_learning_twice_gives_the_same_model(task, performances):
     demonstrations = [performances(["along", "round", "up"], seed) for seed in range(2)]
     one, other = learn(task, demonstrations), learn(task, demonstrations)
-    for a, b in zip(one.parameters, other.parameters, strict=True):
+    for a, b in zip(one.knowledge.parameters, other.knowledge.parameters, strict=True):
         np.testing.assert_array_equal(a, b)
-    assert one.scoring == other.scoring
-    assert one.alarm == other.alarm
+    assert one.knowledge.scoring == other.knowledge.scoring
+    assert one.knowledge.alarm == other.knowledge.alarm
 
 
 def test_every_phase_leads_somewhere_with_probability_one(model):
-    p = model.parameters
+    p = model.knowledge.parameters
     total = p.stay + p.advance + p.skip + p.leave
     possible = total > 0
     np.testing.assert_allclose(total[possible], 1.0)

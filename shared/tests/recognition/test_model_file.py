@@ -15,6 +15,11 @@ def saved(model, tmp_path):
     return save_model(model, path), path
 
 
+def with_parameters(model, **changed):
+    parameters = model.knowledge.parameters._replace(**changed)
+    return model._replace(knowledge=model.knowledge._replace(parameters=parameters))
+
+
 def rewritten(path, change):
     """Unpack, let `change(manifest, arrays)` spoil it, pack again."""
     with zipfile.ZipFile(path) as archive:
@@ -32,12 +37,9 @@ def test_a_model_comes_back_as_it_was(saved):
     loaded = load_model(path)
     assert loaded.hash == model.hash
     assert loaded.task == model.task
-    assert (loaded.scoring, loaded.filter_settings, loaded.alarm) == (
-        model.scoring,
-        model.filter_settings,
-        model.alarm,
-    )
-    for ours, theirs in zip(model.parameters, loaded.parameters, strict=True):
+    assert loaded.recognizer == "segment-filter"
+    assert loaded.knowledge[1:] == model.knowledge[1:]
+    for ours, theirs in zip(model.knowledge[0], loaded.knowledge[0], strict=True):
         np.testing.assert_array_equal(ours, theirs)
     assert loaded.demonstrations == ("seed-0", "seed-1", "seed-2", "seed-3")
     assert set(loaded.paths) == {"along", "round", "up"}
@@ -51,7 +53,8 @@ def test_equal_models_make_equal_files(model, tmp_path):
 
 
 def test_the_hash_tells_models_apart(model):
-    changed = model._replace(scoring=model.scoring._replace(temperature=5.0))
+    scoring = model.knowledge.scoring._replace(temperature=5.0)
+    changed = model._replace(knowledge=model.knowledge._replace(scoring=scoring))
     assert with_hash(changed).hash != with_hash(model).hash
 
 
@@ -73,22 +76,27 @@ def _another_version(manifest, _):
 
 
 def _no_scoring(manifest, _):
-    del manifest["scoring"]
+    del manifest["knowledge"]["scoring"]
+
+
+def _another_recognizer(manifest, _):
+    manifest["recognizer"] = "oracle"
 
 
 def _other_temperature(manifest, _):
-    manifest["scoring"][1] = 9.0
+    manifest["knowledge"]["scoring"]["temperature"] = 9.0
 
 
 def _drop_array(_, parts):
-    del parts["arrays/means.npy"]
+    del parts["arrays/parameters.means.npy"]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (_another_version, "format 'hmcs-model/9', expected 'hmcs-model/1'"),
-        (_no_scoring, "not a complete model"),
+        (_no_scoring, "not a complete model: scoring"),
+        (_another_recognizer, "unknown recognizer 'oracle': choose one of .*segment-filter"),
         (_other_temperature, "checksum"),
         (_drop_array, "not a complete model"),
     ],
@@ -103,21 +111,20 @@ def test_a_changed_file_is_told(saved, change, message):
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("means", np.nan, "'means' holds numbers that are not finite"),
+        ("means", np.nan, "'parameters.means' holds numbers that are not finite"),
         ("variances", 0.0, "positive variances"),
     ],
 )
 def test_numbers_that_cannot_be_are_told(model, tmp_path, field, value, message):
-    array = getattr(model.parameters, field).copy()
+    array = getattr(model.knowledge.parameters, field).copy()
     array.flat[3] = value
-    spoiled = model._replace(parameters=model.parameters._replace(**{field: array}))
-    save_model(spoiled, tmp_path / "m")
+    save_model(with_parameters(model, **{field: array}), tmp_path / "m")
     with pytest.raises(ModelFileError, match=message):
         load_model(tmp_path / "m")
 
 
 def test_arrays_that_do_not_fit_together_are_told(model, tmp_path):
-    short = model.parameters._replace(leave=model.parameters.leave[:, :-1])
-    save_model(model._replace(parameters=short), tmp_path / "m")
+    short = model.knowledge.parameters.leave[:, :-1]
+    save_model(with_parameters(model, leave=short), tmp_path / "m")
     with pytest.raises(ModelFileError, match="'leave' is float64 of shape"):
         load_model(tmp_path / "m")

@@ -1,0 +1,134 @@
+"""The registry of recognizers: what kinds there are, how each learns and how each is made.
+
+A kind is one file with a `KIND` and one line in the entry-point group `hmcs.recognizers` of any
+installed distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from hmcs.errors import UserError
+from hmcs.motion.demonstrations import Demonstration
+from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import Guarded, Recognizer
+from hmcs.recognition.segments import Segment
+from hmcs.task import Task
+
+DEFAULT = "segment-filter"
+GROUP = "hmcs.recognizers"
+
+
+class Lesson(NamedTuple):
+    """What a recognizer learns from."""
+
+    task: Task
+    demonstrations: tuple[Demonstration, ...]
+    segments: tuple[Segment, ...]
+    """The demonstrations cut at their labels; every gesteme of the task has one at least."""
+    settings: Any
+    """Of the kind's own type."""
+    rng: np.random.Generator
+    progress: Callable[[str], None]
+
+
+class Kind(NamedTuple):
+    """A kind of recognizer."""
+
+    name: str
+    summary: str
+    """One line."""
+    source: str
+    """Who described it, where."""
+    settings: type
+    """The choices of learning it: a NamedTuple whose defaults are good without tuning."""
+    knowledge: type
+    """What it learns: a NamedTuple of arrays, numbers, strings and such tuples."""
+    learn: Callable[[Lesson], Any]
+    """Returns the knowledge."""
+    recognizer: Callable[[Model, bool], Recognizer]
+    """Makes a fresh recognizer of a model; with True, one that may begin in any state."""
+    check: Callable[[Any, Task], None] = lambda _knowledge, _task: None
+    """Raises ValueError where knowledge does not fit the task or itself."""
+
+
+@cache
+def _registered() -> Mapping[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def kinds() -> tuple[Kind, ...]:
+    """Return all registered kinds, the default first, then by name."""
+    names = sorted(_registered(), key=lambda name: (name != DEFAULT, name))
+    return tuple(kind_named(name) for name in names)
+
+
+def kind_named(name: str) -> Kind:
+    """Return the kind of that name; raises UserError where none is registered."""
+    entry = _registered().get(name)
+    if entry is None:
+        raise UserError(
+            f"unknown recognizer {name!r}: choose one of {', '.join(sorted(_registered()))} "
+            "(`hmcs recognizers` says what each is)"
+        )
+    kind: Kind = entry.load()
+    return kind
+
+
+def settings_of(kind: Kind, given: Mapping[str, str]) -> Any:
+    """Return a kind's settings with some given as text, names joined by dots where they nest.
+
+    Raises UserError for a name that is none of its settings, or a value that does not fit.
+    """
+    defaults = kind.settings()
+    try:
+        chosen = _replaced(defaults, given)
+        return TypeAdapter(kind.settings).validate_python(chosen)
+    except KeyError as error:
+        names = ", ".join(name for name, _ in setting_values(defaults))
+        raise UserError(
+            f"recognizer {kind.name!r} has no setting {error.args[0]!r}: it has {names}"
+        ) from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise UserError(f"recognizer {kind.name!r}, setting {where}: {first['msg']}") from None
+
+
+def setting_values(settings: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every setting with its value, names joined by dots where they nest."""
+    for field, value in settings._asdict().items():
+        if hasattr(value, "_asdict"):
+            yield from setting_values(value, f"{prefix}{field}.")
+        else:
+            yield f"{prefix}{field}", value
+
+
+def recognizer_of(model: Model, *, anywhere: bool = False) -> Recognizer:
+    """Return a fresh recognizer of a model.
+
+    It begins with the task's first state or, with `anywhere`, in any of its states.
+    """
+    return Guarded(kind_named(model.recognizer).recognizer(model, anywhere))
+
+
+def _replaced(defaults: Any, given: Mapping[str, str]) -> dict[str, Any]:
+    fields: dict[str, Any] = dict(defaults._asdict())
+    nested: dict[str, dict[str, str]] = {}
+    for name, value in given.items():
+        head, dot, rest = name.partition(".")
+        if head not in fields or bool(dot) != hasattr(fields[head], "_asdict"):
+            raise KeyError(name)
+        if dot:
+            nested.setdefault(head, {})[rest] = value
+        else:
+            fields[head] = value
+    for head, inner in nested.items():
+        fields[head] = _replaced(fields[head], inner)
+    return fields
