@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmcs.motion.chains import chained, closed
-from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.demonstrations import Demonstration, DemonstrationError
 
 
 def arc(name: str, turn: float, count: int = 50) -> Demonstration:
@@ -54,3 +54,27 @@ def test_a_demonstration_that_never_moves_cannot_be_closed():
     still = arc("a", 1.0)._replace(positions=np.zeros((50, 3)))
     with pytest.raises(ValueError, match="never moves"):
         closed(still)
+
+
+def felt(name: str, turn: float) -> Demonstration:
+    rng = np.random.default_rng(len(name))
+    quaternions = rng.normal(size=(50, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    wrenches = rng.normal(size=(50, 6))
+    return arc(name, turn)._replace(orientations=quaternions, wrenches=wrenches)
+
+
+def test_orientations_and_wrenches_go_along_with_their_own_samples():
+    pieces = [felt("a", 1.0), felt("bb", -2.0)]
+    chain = closed(chained("chain", pieces, np.zeros(3)))
+    for sense in ("orientations", "wrenches"):
+        kept, own = getattr(chain, sense), [getattr(piece, sense) for piece in pieces]
+        assert len(kept) == len(chain.time_s)
+        np.testing.assert_array_equal(kept[:49], own[0][:-1])
+        np.testing.assert_array_equal(kept[49:], own[1])
+
+
+@pytest.mark.parametrize("sense", ["orientations", "wrenches"])
+def test_a_sense_that_only_some_of_a_chain_have_is_refused_and_the_lacking_one_named(sense):
+    with pytest.raises(DemonstrationError, match=f"^second: has no {sense}, but others"):
+        chained("c", [felt("a", 1.0), felt("second", 1.0)._replace(**{sense: None})], np.zeros(3))

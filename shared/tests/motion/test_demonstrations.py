@@ -16,6 +16,11 @@ from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_c
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 
 
+def quaternions(count: int, seed: int) -> np.ndarray:
+    made = np.random.default_rng(seed).normal(size=(count, 4))
+    return np.asarray(made / np.linalg.norm(made, axis=1, keepdims=True))
+
+
 @given(
     times=st.lists(finite, min_size=2, max_size=20, unique=True),
     data=st.data(),
@@ -30,6 +35,8 @@ def test_what_is_written_is_read_back_to_the_last_bit(
         np.array(sorted(times)),
         data.draw(arrays(float, (count, 3), elements=finite)),
         tuple(data.draw(st.lists(labels, min_size=count, max_size=count))),
+        data.draw(st.none() | st.integers(0, 99).map(lambda seed: quaternions(count, seed))),
+        data.draw(st.none() | arrays(float, (count, 6), elements=finite)),
     )
     file = tmp_path_factory.mktemp("csv") / "d.csv"
     write_csv(file, demonstration)
@@ -38,6 +45,46 @@ def test_what_is_written_is_read_back_to_the_last_bit(
     np.testing.assert_array_equal(back.time_s, demonstration.time_s)
     np.testing.assert_array_equal(back.positions, demonstration.positions)
     assert back.states == demonstration.states
+    for sense in ("orientations", "wrenches"):
+        np.testing.assert_array_equal(getattr(back, sense), getattr(demonstration, sense))
+
+
+SENSES = "qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm"
+
+
+def test_orientation_and_wrench_are_read_from_their_columns(tmp_path: Path) -> None:
+    file = tmp_path / "felt.csv"
+    file.write_text(
+        f"time_s,x_m,y_m,{SENSES},state\n0,1,2,0,0,0,1,1,2,3,4,5,6,a\n1,3,4,0.6,0,0,-0.8,6,5,4,3,2,1,\n"
+    )
+    read = read_csv(file)
+    np.testing.assert_array_equal(read.positions, [[1, 2, 0], [3, 4, 0]])
+    np.testing.assert_array_equal(read.orientations, [[0, 0, 0, 1], [0.6, 0, 0, -0.8]])
+    np.testing.assert_array_equal(read.wrenches, [[1, 2, 3, 4, 5, 6], [6, 5, 4, 3, 2, 1]])
+    assert read.states == ("a", None)
+
+
+def test_a_switch_is_where_another_label_begins() -> None:
+    states = ("a", "a", None, "b", "a", "a")
+    demonstration = Demonstration("d", np.arange(6.0), np.zeros((6, 3)), states)
+    np.testing.assert_array_equal(demonstration.switches, [1, 0, 1, 1, 1, 0])
+    assert not demonstration._replace(states=(None,) * 6).switches.any()
+
+
+def test_a_cut_has_its_samples_of_everything() -> None:
+    whole = Demonstration(
+        "d",
+        np.arange(6.0),
+        np.arange(18.0).reshape(6, 3),
+        tuple("aabbcc"),
+        quaternions(6, 0),
+        np.arange(36.0).reshape(6, 6),
+    )
+    part = whole.cut(2, 5)
+    assert part.states == ("b", "b", "c")
+    for name in ("time_s", "positions", "orientations", "wrenches"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[2:5])
+    assert whole._replace(orientations=None, wrenches=None).cut(1, None)[4:] == (None, None)
 
 
 def test_two_dimensions_lie_in_the_plane_z_0(tmp_path: Path) -> None:
@@ -66,6 +113,11 @@ GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
         (b"time_s,x_m\n0,0\n1,1\n", 1, "1 dimension"),
         (b"time_s,x_m,y_m,z_m,w_m\n", 1, "unknown column 'w_m'"),
         (b"x_m,y_m,time_s\n0,0,0\n", 1, "the columns are"),
+        (b"time_s,x_m,y_m,qx,qy,qw\n", 1, "there is no column 'qz'"),
+        (b"time_s,x_m,y_m,fx_n,fy_n,fz_n,state\n", 1, "no column 'tx_nm', 'ty_nm', 'tz_nm'"),
+        (b"time_s,x_m,y_m,qw,qx,qy,qz\n", 1, "the columns are"),
+        (b"time_s,x_m,y_m,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,2\n", 3, "length 1"),
+        (b"time_s,x_m,y_m,qx,qy,qz,qw\n0,0,0,0,0,0,nan\n", 2, "qw is nan"),
         (b"time_s,x_m,y_m,y_m\n0,0,0,0\n1,0,0,0\n", 1, "header must be"),
         (GOOD.encode() + b"2,2,2\n", 4, "3 field(s), expected 4"),
         (GOOD.encode() + b"2,2,2,2,2\n", 4, "5 field(s), expected 4"),

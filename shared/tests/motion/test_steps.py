@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hmcs.motion.steps import DeadZone, steps_of
+from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.quaternions import continuous, unit_quaternion
+from hmcs.motion.steps import DeadZone, Step, steps_of, steps_of_demonstration
 
 coordinates = st.floats(-1, 1, allow_nan=False)
 motions = st.integers(1, 60).flatmap(lambda n: arrays(float, (n, 3), elements=coordinates))
@@ -89,7 +91,7 @@ def test_motion_below_the_dead_zone_makes_no_step() -> None:
 def test_a_position_that_is_none_is_refused_and_changes_nothing(bad: tuple[float, ...]) -> None:
     zone = DeadZone(0.01)
     zone.push((0, 0, 0))
-    with pytest.raises(ValueError, match="three finite numbers"):
+    with pytest.raises(ValueError, match="3 finite numbers"):
         zone.push(bad)
     step = zone.push((0.02, 0, 0))
     assert step is not None
@@ -110,3 +112,158 @@ def test_changing_an_array_afterwards_does_not_change_a_step() -> None:
     step = zone.push((0.02, 0, 0))
     assert step is not None
     np.testing.assert_array_equal(step.position, (0, 0, 0))
+
+
+# --- orientation, wrench and mark -----------------------------------------------------------------
+
+
+def ends_of(motion: np.ndarray, steps: list[Step]) -> list[int]:
+    """The samples that end each step of a motion that is nowhere twice."""
+    return [int(np.abs(motion - s.position - s.displacement).max(axis=1).argmin()) for s in steps]
+
+
+@pytest.fixture
+def felt() -> Demonstration:
+    """A hand that turns, pushes and goes on with another part at sample 40."""
+    rng = np.random.default_rng(1)
+    angle = np.linspace(0, 3, 100)
+    axis = np.array([[0.6, 0.0, 0.8]])
+    return Demonstration(
+        "felt",
+        np.arange(100) / 100,
+        np.cumsum(rng.uniform(0, 0.01, (100, 3)), axis=0),
+        ("reach",) * 40 + ("press",) * 60,
+        np.hstack([np.sin(angle)[:, None] * axis, np.cos(angle)[:, None]]),
+        rng.normal(size=(100, 6)),
+    )
+
+
+def test_a_step_tells_the_orientation_it_ends_with_and_the_mean_wrench_of_its_samples(
+    felt: Demonstration,
+) -> None:
+    assert felt.orientations is not None
+    assert felt.wrenches is not None
+    steps = steps_of_demonstration(felt, 0.03)
+    assert len(steps) > 10
+    begin = 0
+    for step, end in zip(steps, ends_of(felt.positions, steps), strict=True):
+        np.testing.assert_allclose(step.orientation, felt.orientations[end], atol=1e-12)
+        np.testing.assert_allclose(step.wrench, felt.wrenches[begin : end + 1].mean(axis=0))
+        begin = end + 1
+
+
+def test_the_sign_of_orientations_does_not_jump(felt: Demonstration) -> None:
+    assert felt.orientations is not None
+    signs = np.random.default_rng(2).choice([-1.0, 1.0], (100, 1))
+    jumping = felt._replace(orientations=signs * felt.orientations)
+    quaternions = [step.orientation for step in steps_of_demonstration(jumping, 0.03)]
+    for before, after in itertools.pairwise(quaternions):
+        assert before @ after > 0
+    known = [step.orientation for step in steps_of_demonstration(felt, 0.03)]
+    np.testing.assert_allclose(np.abs(np.sum(np.multiply(known, quaternions), axis=1)), 1)
+
+
+@given(
+    st.integers(1, 20).flatmap(lambda n: arrays(float, (n, 4), elements=st.floats(0.1, 1))),
+    st.integers(0, 2**32 - 1),
+)
+def test_continuous_quaternions_are_the_same_rotations_without_jumps(
+    quaternions: np.ndarray, seed: int
+) -> None:
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (len(quaternions), 1))
+    smooth = continuous(signs * quaternions)
+    np.testing.assert_array_equal(np.abs(smooth), np.abs(quaternions))
+    np.testing.assert_array_equal(smooth, signs[0] * quaternions)
+
+
+def test_a_motion_without_further_senses_has_none_in_its_steps() -> None:
+    for step in steps_of(np.arange(30.0).reshape(10, 3), 0.1):
+        assert step.orientation is None
+        assert step.wrench is None
+        assert not step.mark
+
+
+def test_marks_stand_on_the_steps_in_which_a_label_begins(felt: Demonstration) -> None:
+    steps = steps_of_demonstration(felt, 0.03, mark_switches=True)
+    begins = [0, *ends_of(felt.positions, steps)[:-1]]
+    holding = max(t for t, begin in enumerate(begins) if begin <= 40)
+    assert [step.index for step in steps if step.mark] == [0, holding]
+    assert not any(step.mark for step in steps_of_demonstration(felt, 0.03))
+
+
+def along_x(count: int) -> np.ndarray:
+    """Samples each of which ends a step."""
+    return np.outer(np.arange(count), (1.0, 0, 0))
+
+
+def test_a_pedal_that_goes_down_where_a_step_ends_marks_the_one_that_begins_there() -> None:
+    steps = steps_of(along_x(6), 0.5, pedals=[False, False, True, True, False, True])
+    assert [step.index for step in steps if step.mark] == [2]
+    steps = steps_of(along_x(6), 0.5, pedals=[True, False, True, False, True, False])
+    assert [step.index for step in steps if step.mark] == [0, 2, 4]
+
+
+def test_a_pedal_that_goes_down_while_the_hand_is_lifted_marks_the_next_step() -> None:
+    zone = DeadZone(0.5)
+    zone.lift(pedal=False)
+    assert zone.push((0, 0, 0)) is None
+    zone.lift(pedal=True)
+    zone.lift(pedal=False)
+    assert zone.push((9, 0, 0)) is None
+    made = [zone.push((9 + k, 0, 0), pedal=False) for k in (1, 2)]
+    assert [step.mark for step in made if step is not None] == [True, False]
+
+
+def test_a_pedal_held_down_through_a_lift_marks_once() -> None:
+    zone = DeadZone(0.5)
+    zone.push((0, 0, 0), pedal=True)
+    zone.lift(pedal=True)
+    zone.push((5, 0, 0), pedal=True)
+    made = [zone.push((5 + k, 0, 0), pedal=True) for k in (1, 2)]
+    assert [step.mark for step in made if step is not None] == [True, False]
+
+
+BAD_SENSES = [
+    ({"orientation": (0, 0, 0, 1.1)}, "unit quaternion"),
+    ({"orientation": (0, 0, 0, 0)}, "unit quaternion"),
+    ({"orientation": (0, 0, 1)}, "unit quaternion"),
+    ({"orientation": (0, 0, np.nan, 1)}, "unit quaternion"),
+    ({"wrench": (0, 0, 0)}, "6 finite numbers"),
+    ({"wrench": (0, 0, 0, 0, 0, np.inf)}, "6 finite numbers"),
+]
+
+
+@pytest.mark.parametrize(("bad", "said"), BAD_SENSES)
+def test_a_sense_that_is_none_is_refused_and_changes_nothing(
+    bad: dict[str, tuple[float, ...]], said: str
+) -> None:
+    refusing, other = DeadZone(0.5), DeadZone(0.5)
+    good = {"orientation": (0, 0, 0, 1), "wrench": np.ones(6)}
+    for x_m in (0.0, 0.4, 0.8):
+        with pytest.raises(ValueError, match=said):
+            refusing.push((x_m + 0.2, 0, 0), **{**good, **bad}, pedal=True)
+        one, same = (zone.push((x_m, 0, 0), **good) for zone in (refusing, other))
+    assert one is not None
+    assert same is not None
+    assert not one.mark
+    for name in Step._fields:
+        np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
+
+
+def test_rounding_in_a_quaternion_is_undone() -> None:
+    assert np.linalg.norm(unit_quaternion((0, 0.6, 0, 0.8005))) == pytest.approx(1, abs=1e-15)
+
+
+def test_as_many_samples_of_every_sense_are_needed() -> None:
+    with pytest.raises(ValueError, match="shorter"):
+        steps_of(along_x(6), 0.5, wrenches=np.zeros((5, 6)))
+
+
+def test_changing_a_wrench_afterwards_does_not_change_a_step() -> None:
+    wrench = np.ones(6)
+    zone = DeadZone(0.5)
+    zone.push((0, 0, 0), wrench=wrench)
+    wrench[:] = 3
+    step = zone.push((1, 0, 0), wrench=wrench)
+    assert step is not None
+    np.testing.assert_array_equal(step.wrench, np.full(6, 2.0))
