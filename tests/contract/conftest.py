@@ -66,9 +66,16 @@ def _array(spec: ArraySpec) -> Any_:
         elements = (
             {"allow_nan": False, "allow_infinity": False} if np.dtype(dtype).kind == "f" else {}
         )
-        return npst.arrays(dtype, shape, elements=elements)
+        made = npst.arrays(dtype, shape, elements=elements)
+        return made.map(_of_unit_length) if spec.unit else made
 
     return st.sampled_from(spec.dtypes).flatmap(arrays)
+
+
+def _of_unit_length(array: Any) -> Any:
+    vector = np.clip(array, -1, 1)
+    vector[0] = 1.0
+    return vector / np.linalg.norm(vector)
 
 
 def _scalar(annotation: Any, metadata: list[Any]) -> Any_:

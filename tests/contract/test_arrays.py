@@ -39,6 +39,14 @@ def test_what_is_not_finite_is_refused_where_it_is_made(bad) -> None:
         VECTOR.read([0.0, bad, 0.0])
 
 
+@pytest.mark.parametrize("turn", [[0, 0, 0, 1.01], [0, 0, 0, 0], [1, 1, 0, 0]])
+def test_what_is_no_rotation_is_refused_as_a_quaternion(turn) -> None:
+    spec = ArraySpec((4,), unit=True)
+    with pytest.raises(ValueError, match="expected a length of 1"):
+        spec.read(to_wire(np.array(turn, dtype=float)), from_wire=True)
+    assert spec.read([0.0, 0.6, 0.0, -0.8]).tolist() == [0.0, 0.6, 0.0, -0.8]
+
+
 def test_a_field_is_a_copy_nobody_can_change() -> None:
     mine = np.zeros(3)
     read = VECTOR.read(mine)

@@ -199,7 +199,7 @@ def _interpolated(demonstration: Demonstration, period_s: float) -> NDArray[np.f
 
 def message_of(step: MotionStep) -> Step:
     """Return a step as it travels."""
-    return Step(index=step.index, position=step.position, displacement=step.displacement)
+    return Step(**step._asdict())
 
 
 def told(belief: Belief) -> dict[str, Any]:

@@ -6,6 +6,7 @@ read is checked for type, shape and finiteness before anything else sees it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -20,6 +21,9 @@ Dimension = int | None
 FROM_WIRE = "from wire"
 """Validation context of what was received; see `ArraySpec.read`."""
 
+UNIT_WITHIN = 1e-3
+"""How much the length of a unit vector may differ from one."""
+
 
 @dataclass(frozen=True)
 class ArraySpec:
@@ -27,12 +31,15 @@ class ArraySpec:
 
     shape: tuple[Dimension, ...]
     dtypes: tuple[str, ...] = ("<f8",)
+    unit: bool = False
+    """Whether the numbers are those of a vector of length one, but for rounding."""
 
     def read(self, value: object, *, from_wire: bool = False) -> NDArray[Any]:
         """Return `value`, a wire map or an array-like, as a read-only array.
 
         From the wire only the map is admitted. Raises ValueError when it is none, when the dtype,
-        the shape or the byte count is not what the field admits, or a number is not finite.
+        the shape or the byte count is not what the field admits, a number is not finite, or the
+        length is not one where the field says so.
         """
         try:
             if isinstance(value, dict):
@@ -51,6 +58,8 @@ class ArraySpec:
             raise ValueError(f"array has shape {array.shape}, expected {self.shape_text}")
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             raise ValueError("array holds a number that is not finite")
+        if self.unit and abs(math.hypot(*array.tolist()) - 1.0) > UNIT_WITHIN:
+            raise ValueError(f"array is {array.tolist()}, expected a length of 1")
         return array
 
     @property
@@ -92,7 +101,8 @@ class ArraySpec:
     ) -> JsonSchemaValue:
         return {
             "type": "object",
-            "description": f"array of shape {self.shape_text}, little-endian, C order",
+            "description": f"array of shape {self.shape_text}, little-endian, C order"
+            + (", a vector of length 1" if self.unit else ""),
             "properties": {
                 "dtype": {"enum": list(self.dtypes)},
                 "shape": {
@@ -115,8 +125,8 @@ def to_wire(array: NDArray[Any]) -> dict[str, Any]:
 
 Vector3 = Annotated[NDArray[np.float64], ArraySpec((3,))]
 """Three numbers along x, y, z."""
-Quaternion = Annotated[NDArray[np.float64], ArraySpec((4,))]
-"""A rotation as x, y, z, w."""
+Quaternion = Annotated[NDArray[np.float64], ArraySpec((4,), unit=True)]
+"""A rotation as x, y, z, w, of length one."""
 Vector6 = Annotated[NDArray[np.float64], ArraySpec((6,))]
 """A twist or a wrench: linear x, y, z, then angular x, y, z."""
 Floats = Annotated[NDArray[np.float64], ArraySpec((None,))]

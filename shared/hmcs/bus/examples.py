@@ -36,7 +36,12 @@ ENVELOPE = Envelope(
 """The envelope of the examples."""
 
 _STEP = Step(
-    index=41, position=np.array([0.1, -0.25, 0.5]), displacement=np.array([0.004, 0.0, -0.003])
+    index=41,
+    position=np.array([0.1, -0.25, 0.5]),
+    displacement=np.array([0.004, 0.0, -0.003]),
+    orientation=np.array([0.0, 0.6, 0.0, 0.8]),
+    wrench=np.array([1.0, 0.0, -2.0, 0.0, 0.25, 0.0]),
+    mark=True,
 )
 
 EXAMPLES: tuple[Message, ...] = (

@@ -219,6 +219,15 @@ class Step(Message):
     the dead-man released or the clutch pressed is taken out, so the path has no jumps."""
     displacement: Vector3
     """x_{t+1} − x_t, m, shape (3,); at least δ long."""
+    orientation: Quaternion | None = None
+    """Of the hand where the step ends, x y z w, shape (4,), with the sign nearer to that of the
+    step before; None where the device has none."""
+    wrench: Vector6 | None = None
+    """The operator's force, N, then torque, N·m, shape (6,): the mean over the samples of the step,
+    the one that ends it included; None where the device has none."""
+    mark: bool = False
+    """True where the pedal went down in this step, its first sample included and its last one not:
+    the operator says that a new part of the task begins with it."""
 
 
 class Evidence(Message):
