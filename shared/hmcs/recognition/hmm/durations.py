@@ -16,7 +16,7 @@ from hmcs.errors import UserError
 from hmcs.recognition.hmm.markov import Array, checked_rows, checked_states
 
 
-class DurationError(UserError):
+class DurationError(UserError, ValueError):
     """A model of durations, or evidence for it, that does not fit together; says where."""
 
 

@@ -20,7 +20,7 @@ SUM_TOLERANCE = 1e-9
 """Probabilities that should sum to one may miss it by this much."""
 
 
-class MarkovModelError(UserError):
+class MarkovModelError(UserError, ValueError):
     """Probabilities that make no Markov model, or states it cannot speak of; says which and why."""
 
 

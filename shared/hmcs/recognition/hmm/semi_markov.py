@@ -57,7 +57,7 @@ class Filtered(NamedTuple):
     """log P(observation t | observations 0..t−1), shape (T,)."""
 
 
-class DecodedSegment(NamedTuple):
+class Segment(NamedTuple):
     """A segment of the most probable segmentation."""
 
     state: int
@@ -67,10 +67,10 @@ class DecodedSegment(NamedTuple):
     """How many of the observed steps it covers."""
 
 
-class Decoded(NamedTuple):
+class Segmentation(NamedTuple):
     """The most probable segmentation."""
 
-    segments: tuple[DecodedSegment, ...]
+    segments: tuple[Segment, ...]
     states: States
     """The state at each step, shape (T,)."""
     log_probability: float
@@ -132,7 +132,7 @@ def smoothed(model: DurationHmm, log_emission: Array) -> Array:
     return np.asarray(np.exp(joint - np.logaddexp.reduce(log_alpha[-1], axis=None)))
 
 
-def decoded(model: DurationHmm, log_emission: Array) -> Decoded:
+def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
     """Return the most probable segmentation. Raises as `filtered`."""
     _check_emission(model, log_emission)
     log_durations, log_transition = _log(model.durations), _log(model.transition)
@@ -160,9 +160,9 @@ def decoded(model: DurationHmm, log_emission: Array) -> Decoded:
             remaining += 1
     bounds = [*reversed(firsts), steps]
     segments = tuple(
-        DecodedSegment(int(path[first]), first, after - first) for first, after in pairwise(bounds)
+        Segment(int(path[first]), first, after - first) for first, after in pairwise(bounds)
     )
-    return Decoded(segments, path, float(best.max()))
+    return Segmentation(segments, path, float(best.max()))
 
 
 def _forward(model: DurationHmm, log_emission: Array) -> Array:
@@ -212,7 +212,8 @@ def _impossible(log_alpha: Array) -> ImpossibleSequenceError:
     dead = int(np.argmax(~np.isfinite(log_alpha).any(axis=(1, 2))))
     return ImpossibleSequenceError(
         f"the sequence is impossible under the model from its observation {dead} on: "
-        "check durations, structural zeros and emission floors"
+        "check durations, structural zeros and emission floors",
+        dead,
     )
 
 
