@@ -1,1 +1,1 @@
-"""Hidden Markov models (thesis 2.1.2): arrays in, arrays out."""
+"""Hidden Markov models (thesis 2.1.2): evaluation, decoding, learning; arrays in, arrays out."""

@@ -339,14 +339,15 @@ def log_gaussians(means: Array, variances: Array, observations: Array) -> Array:
     return np.asarray(-0.5 * terms.sum(axis=2))
 
 
-def floored(rows: Array, floor: float) -> Array:
-    """Return the rows p maximizing Σ q log p over p ≥ floor, Σ p = 1, shape as `rows` q.
+def floored(rows: Array, floor: float | Array) -> Array:
+    """Return the rows p maximizing Σ q log p over p ≥ floor, Σ p = 1, for rows q, (R, M).
 
-    Entries that would be below the floor lie on it; the others keep their proportions.
+    Entries that would be below the floor lie on it; the others keep their proportions. The floor
+    is one for all, or one for each row, shape (R, 1).
     """
     low = np.zeros(rows.shape, dtype=bool)
     result = rows
-    while floor > 0:
+    while np.any(floor):
         free = np.where(low, 0.0, rows).sum(axis=1, keepdims=True)
         left = 1.0 - floor * low.sum(axis=1, keepdims=True)
         scaled = rows * left / np.where(free > 0, free, 1.0)
@@ -414,10 +415,7 @@ def _moments(
     pairs = list(zip(weights, sequences, strict=True))
     means = np.where(seen, np.sum([w.T @ o for w, o in pairs], axis=0) / safe, old_means)
     spread = np.sum(
-        [
-            np.einsum("tn,tnf->nf", w, (o[:, None, :] - means[None, :, :]) ** 2)
-            for w, o in pairs
-        ],
+        [np.einsum("tn,tnf->nf", w, (o[:, None, :] - means[None, :, :]) ** 2) for w, o in pairs],
         axis=0,
     )
     variances = np.where(seen, np.maximum(spread / safe, variance_floor), old_variances)

@@ -17,7 +17,7 @@ from hmcs.errors import UserError
 Array = NDArray[np.float64]
 Path = NDArray[np.int64]
 
-_LOST = 1e-300
+LOST = 1e-300
 """A scaled probability below this counts as zero, so that its inverse still is a double."""
 
 
@@ -96,13 +96,13 @@ def forward_scaled(initial: Array, transition: Array, log_emission: Array) -> Sc
     log_scales = np.empty(len(log_emission))
     predicted = initial
     for t, emission in enumerate(log_emission):
-        predicted = np.where(predicted < _LOST, 0.0, predicted)
+        predicted = np.where(predicted < LOST, 0.0, predicted)
         top = float(emission.max(initial=-np.inf, where=predicted > 0))
         if not np.isfinite(top):
             raise _impossible(log_emission, t)
         joint = predicted * np.exp(np.minimum(emission - top, 0.0))
         total = float(joint.sum())
-        states[t] = np.where(joint < _LOST * total, 0.0, joint / total)
+        states[t] = np.where(joint < LOST * total, 0.0, joint / total)
         log_scales[t] = np.log(total) + top
         predicted = states[t] @ transition
     return ScaledForward(states, log_scales)

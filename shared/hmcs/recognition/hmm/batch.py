@@ -1,0 +1,382 @@
+"""Baum–Welch of many hidden Markov models at once, vectorized over models and sequences.
+
+Shapes: M models of N states each; K sequences of a model at most, T observations of a sequence at
+most (fewer and shorter ones are padded); F dimensions, S symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.errors import UserError
+from hmcs.recognition.hmm.emissions import (
+    Discrete,
+    Gaussian,
+    ModelError,
+    ObservationError,
+    Observations,
+    check_spread,
+    floored,
+)
+from hmcs.recognition.hmm.inference import Array, log_likelihood, smooth
+from hmcs.recognition.hmm.learning import ALL, Learned, Parts, checked_sequences, renormalized
+from hmcs.recognition.hmm.model import Hmm, naming_the_observation
+
+B = TypeVar("B", Discrete, Gaussian)
+Mask = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+_TRUSTED_NATS = 600.0
+"""A sequence is scored scaled if its log-likelihood is at most this below the sum of its best
+log-emissions: a path lost to underflow (below exp(−708)) then is at most exp(−108) of it."""
+
+
+def baum_welch_many(
+    models: Sequence[Hmm[B]],
+    sequences: Sequence[Sequence[Observations]],
+    *,
+    learn: Parts = ALL,
+    max_iterations: int = 20,
+    tolerance: float = 1e-4,
+) -> tuple[Learned[B], ...]:
+    """Return what `baum_welch` returns of each model with its own sequences.
+
+    All models have the same kind of emission and the same number of states and of dimensions or
+    symbols. Each stops by itself. Raises what `baum_welch` raises, naming the model too.
+    """
+    if len(models) != len(sequences):
+        raise ObservationError(
+            f"{len(models)} models but lists of sequences for {len(sequences)}: give one for each"
+        )
+    if not models:
+        return ()
+    for m, (model, own) in enumerate(zip(models, sequences, strict=True)):
+        _check(m, model, models[0], own, learn)
+    batch = _batch(models, sequences)
+    histories: list[list[float]] = [[] for _ in models]
+    final: list[Hmm[B]] = list(models)
+    emission: Array | None = None
+    for iteration in range(max_iterations + 1):
+        if emission is None:
+            emission = batch.emissions.log_likelihood(batch.observations)
+        passed = _forward(batch, emission)
+        for m, value in zip(batch.numbers, passed.log_likelihoods.sum(axis=1), strict=True):
+            histories[m].append(float(value))
+        going = np.array(
+            [
+                iteration < max_iterations
+                and (len(histories[m]) == 1 or histories[m][-1] - histories[m][-2] >= tolerance)
+                for m in batch.numbers
+            ]
+        )
+        for at in np.flatnonzero(~going):
+            m = batch.numbers[at]
+            final[m] = Hmm(
+                batch.initial[at],
+                batch.transition[at],
+                batch.emissions.of_model(int(at), models[m].emission),
+            )
+        if not going.any():
+            break
+        if not going.all():
+            batch, passed, emission = batch.only(going), passed.only(going), emission[:, going]
+        batch = _reestimated(batch, _expected(batch, passed, emission), learn)
+        if learn.emission:
+            emission = None
+    return tuple(Learned(*pair) for pair in zip(final, map(tuple, histories), strict=True))
+
+
+class _Emissions(Protocol):
+    """The emissions of all models in one."""
+
+    def log_likelihood(self, observations: NDArray[Any]) -> Array:
+        """Shape (T, M, K, N); anything in padding."""
+        ...
+
+    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
+        """From γ, shape (T, M, K, N), zero in padding."""
+        ...
+
+    def only(self, kept: Mask) -> Self: ...
+
+    def of_model(self, at: int, like: Any) -> Any:
+        """The emission of one model, otherwise like the one it began with."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Gaussians:
+    means: Array  # (M, N, F)
+    variances: Array
+    floors: Array  # (M,)
+
+    def log_likelihood(self, observations: NDArray[Any]) -> Array:
+        total = np.empty((*observations.shape[:3], self.means.shape[1]))
+        total[...] = -0.5 * np.log(2.0 * np.pi * self.variances).sum(axis=2)[:, None, :]
+        # A dimension at a time: four large arrays in turn stay in the cache, one of (…, N, F) not.
+        for f in range(self.means.shape[2]):
+            difference = observations[..., f, None] - self.means[:, None, :, f]
+            difference *= difference
+            difference *= (0.5 / self.variances[:, :, f])[:, None, :]
+            total -= difference
+        return total
+
+    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
+        weights = _by_model(states).swapaxes(1, 2)
+        vectors = _by_model(observations)
+        weight = weights.sum(axis=2)[:, :, None]
+        seen = weight > 1e-12
+        safe = np.where(seen, weight, 1.0)
+        means = np.where(seen, weights @ vectors / safe, self.means)
+        spread = np.empty_like(means)
+        for f in range(means.shape[2]):
+            difference = vectors[:, None, :, f] - means[:, :, f, None]
+            difference *= difference
+            spread[:, :, f] = np.einsum("mns,mns->mn", weights, difference)
+        lowest = self.floors[:, None, None]
+        variances = np.where(seen, np.maximum(spread / safe, lowest), self.variances)
+        if not (variances > 0).all():
+            at, state, f = np.argwhere(~(variances > 0))[0]
+            raise ModelError(
+                f"model {numbers[at]}: the variance of state {state} in dimension {f} becomes 0: "
+                "learn with a variance_floor"
+            )
+        return replace(self, means=means, variances=variances)
+
+    def only(self, kept: Mask) -> Self:
+        return replace(
+            self, means=self.means[kept], variances=self.variances[kept], floors=self.floors[kept]
+        )
+
+    def of_model(self, at: int, like: Gaussian) -> Gaussian:
+        return replace(like, means=self.means[at], variances=self.variances[at])
+
+
+@dataclass(frozen=True, eq=False)
+class _Discretes:
+    probabilities: Array  # (M, N, S)
+    floors: Array  # (M,)
+
+    def log_likelihood(self, observations: NDArray[Any]) -> Array:
+        with np.errstate(divide="ignore"):
+            by_symbol = np.log(self.probabilities).swapaxes(1, 2)
+        model = np.arange(len(by_symbol))[:, None]
+        return np.asarray(by_symbol[model, observations])
+
+    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
+        models, count, symbols = self.probabilities.shape
+        cell = (observations + symbols * np.arange(models)[:, None]).ravel()
+        counts = np.stack(
+            [
+                np.bincount(cell, states[..., n].ravel(), models * symbols).reshape(models, symbols)
+                for n in range(count)
+            ],
+            axis=1,
+        )
+        weight = counts.sum(axis=2, keepdims=True)
+        share = counts / np.where(weight > 0, weight, 1.0)
+        floors = np.repeat(self.floors, count)[:, None]
+        rows = floored(share.reshape(models * count, symbols), floors).reshape(counts.shape)
+        return replace(self, probabilities=np.where(weight > 0, rows, self.probabilities))
+
+    def only(self, kept: Mask) -> Self:
+        return replace(self, probabilities=self.probabilities[kept], floors=self.floors[kept])
+
+    def of_model(self, at: int, like: Discrete) -> Discrete:
+        return replace(like, probabilities=self.probabilities[at])
+
+
+class _Batch(NamedTuple):
+    """Models still learning, and their sequences."""
+
+    numbers: Integers
+    """Which of the given models these are, shape (M,)."""
+    initial: Array
+    transition: Array
+    emissions: _Emissions
+    observations: NDArray[Any]
+    """Shape (T, M, K) or (T, M, K, F), zero in padding."""
+    lengths: Integers
+    """Shape (M, K), zero for a sequence that is none."""
+
+    def only(self, kept: Mask) -> _Batch:
+        return _Batch(
+            self.numbers[kept],
+            self.initial[kept],
+            self.transition[kept],
+            self.emissions.only(kept),
+            self.observations[:, kept],
+            self.lengths[kept],
+        )
+
+
+class _Forward(NamedTuple):
+    """Scaled forward variables; of a sequence not trusted they mean nothing."""
+
+    likelihood: Array
+    """P(o_t | state i) divided by the largest of all states, shape (T, M, K, N); 0 in padding."""
+    states: Array
+    """P(state i at t | o_1..o_t), shape (T, M, K, N)."""
+    scales: Array
+    """Shape (T, M, K, 1); 1 in padding."""
+    trusted: Mask
+    """Shape (M, K)."""
+    log_likelihoods: Array
+    """log P of each sequence, shape (M, K); 0 of one that is none."""
+
+    def only(self, kept: Mask) -> _Forward:
+        return _Forward(
+            self.likelihood[:, kept],
+            self.states[:, kept],
+            self.scales[:, kept],
+            self.trusted[kept],
+            self.log_likelihoods[kept],
+        )
+
+
+class _Expected(NamedTuple):
+    states: Array
+    """γ, shape (T, M, K, N); 0 in padding."""
+    transitions: Array
+    """Σ ξ over time and sequences, shape (M, N, N)."""
+
+
+def _check(
+    m: int, model: Hmm[B], first: Hmm[B], sequences: Sequence[Observations], learn: Parts
+) -> None:
+    try:
+        checked_sequences(model, sequences, learn)
+        if isinstance(model.emission, Gaussian) and learn.emission:
+            check_spread(sequences, model.emission.variance_floor)
+    except (ModelError, ObservationError) as error:
+        raise type(error)(f"model {m}: {error}") from error
+    shapes = [_parameters(each.emission).shape for each in (model, first)]
+    if type(model.emission) is not type(first.emission) or shapes[0] != shapes[1]:
+        raise ModelError(
+            f"model {m} has {type(model.emission).__name__} emissions of shape {shapes[0]}, model "
+            f"0 {type(first.emission).__name__} of {shapes[1]}: learn models of different shape "
+            "in calls of their own"
+        )
+
+
+def _parameters(emission: Discrete | Gaussian) -> Array:
+    return emission.means if isinstance(emission, Gaussian) else emission.probabilities
+
+
+def _batch(models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations]]) -> _Batch:
+    lengths = np.zeros((len(models), max(len(own) for own in sequences)), dtype=np.int64)
+    for m, own in enumerate(sequences):
+        lengths[m, : len(own)] = [len(sequence) for sequence in own]
+    given = [np.asarray(sequence) for own in sequences for sequence in own]
+    shape = (int(lengths.max()), *lengths.shape, *given[0].shape[1:])
+    observations: NDArray[Any] = np.zeros(shape, np.result_type(*given))
+    for m, own in enumerate(sequences):
+        for k, sequence in enumerate(own):
+            observations[: len(sequence), m, k] = sequence
+    return _Batch(
+        np.arange(len(models)),
+        np.stack([model.initial for model in models]),
+        np.stack([model.transition for model in models]),
+        _stacked([model.emission for model in models]),
+        observations,
+        lengths,
+    )
+
+
+def _stacked(emissions: Sequence[Discrete | Gaussian]) -> _Emissions:
+    parameters = np.stack([_parameters(emission) for emission in emissions])
+    gaussians = [emission for emission in emissions if isinstance(emission, Gaussian)]
+    if gaussians:
+        return _Gaussians(
+            parameters,
+            np.stack([emission.variances for emission in gaussians]),
+            np.array([emission.variance_floor for emission in gaussians]),
+        )
+    discretes = [emission for emission in emissions if isinstance(emission, Discrete)]
+    return _Discretes(parameters, np.array([emission.floor for emission in discretes]))
+
+
+def _forward(batch: _Batch, log_emission: Array) -> _Forward:
+    steps = len(log_emission)
+    present = np.arange(steps)[:, None, None] < batch.lengths
+    top = log_emission.max(axis=3)
+    top = np.where(present & np.isfinite(top), top, 0.0)
+    likelihood = np.exp(log_emission - top[..., None])
+    likelihood *= present[..., None]
+    padding = (~present).astype(np.float64)[..., None]
+    states = np.empty_like(likelihood)
+    scales = np.empty_like(padding)
+    # An impossible sequence divides by zero; it is not trusted and so not read.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for t in range(steps):
+            predicted = batch.initial[:, None] if t == 0 else states[t - 1] @ batch.transition
+            joint = np.multiply(predicted, likelihood[t], out=states[t])
+            np.add(joint.sum(axis=2, keepdims=True), padding[t], out=scales[t])
+            joint /= scales[t]
+        log_scales = np.log(scales[..., 0]).sum(axis=0)
+    trusted = log_scales > -_TRUSTED_NATS
+    log_likelihoods = log_scales + top.sum(axis=0)
+    for m, k in np.argwhere(~trusted):
+        log_likelihoods[m, k] = log_likelihood(
+            batch.initial[m], batch.transition[m], log_emission[: batch.lengths[m, k], m, k]
+        )
+    return _Forward(likelihood, states, scales, trusted, log_likelihoods)
+
+
+def _expected(batch: _Batch, passed: _Forward, log_emission: Array) -> _Expected:
+    steps = len(log_emission)
+    last = (np.arange(1, steps + 1)[:, None, None] == batch.lengths).astype(np.float64)[..., None]
+    backward_transition = np.ascontiguousarray(batch.transition.swapaxes(1, 2))
+    beta = np.empty_like(passed.states)
+    # b β / c of the next step; what is observed next in padding has no likelihood, so that β ends
+    # where its sequence does.
+    ahead = np.zeros_like(passed.states)
+    beta[-1] = last[-1]
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        weight = passed.likelihood / passed.scales
+        for t in range(steps - 2, -1, -1):
+            np.multiply(weight[t + 1], beta[t + 1], out=ahead[t])
+            np.matmul(ahead[t], backward_transition, out=beta[t])
+            beta[t] += last[t]
+        states = passed.states * beta
+    doubtful = np.argwhere(~passed.trusted)
+    before = passed.states
+    if len(doubtful):
+        before = np.where(passed.trusted[..., None], before, 0.0)
+        ahead = np.where(passed.trusted[..., None], ahead, 0.0)
+    transitions = batch.transition * (_by_model(before).swapaxes(1, 2) @ _by_model(ahead))
+    for m, k in doubtful:
+        length = batch.lengths[m, k]
+        try:
+            with naming_the_observation(batch.observations[:, m, k], int(k)):
+                smoothed = smooth(
+                    batch.initial[m], batch.transition[m], log_emission[:length, m, k]
+                )
+        except UserError as error:
+            raise type(error)(f"model {batch.numbers[m]}: {error}") from error
+        states[:, m, k] = 0.0
+        states[:length, m, k] = smoothed.states
+        transitions[m] += smoothed.transitions
+    return _Expected(states, transitions)
+
+
+def _reestimated(batch: _Batch, expected: _Expected, learn: Parts) -> _Batch:
+    if learn.initial:
+        sequences = (batch.lengths > 0).sum(axis=1, keepdims=True)
+        batch = batch._replace(initial=expected.states[0].sum(axis=1) / sequences)
+    if learn.transition:
+        batch = batch._replace(transition=renormalized(expected.transitions, batch.transition))
+    if learn.emission:
+        emissions = batch.emissions.reestimated(batch.observations, expected.states, batch.numbers)
+        batch = batch._replace(emissions=emissions)
+    return batch
+
+
+def _by_model(values: NDArray[Any]) -> NDArray[Any]:
+    """(T, M, K, X) as (M, T·K, X)."""
+    return values.swapaxes(0, 1).reshape(values.shape[1], -1, values.shape[3])
