@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recognition.gestemes import GestemeParameters
-from hmcs.recognition.hmm.learning import GaussianHmm, baum_welch
+from hmcs.recognition.hmm.emissions import Gaussian
+from hmcs.recognition.hmm.learning import EMISSION, baum_welch
+from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.segment_filter import FilterSettings
 from hmcs.recognition.segments import Segment
 
@@ -163,9 +165,9 @@ def _refined(
     count = len(means)
     transition = np.diag(chain[1]) + np.diag(chain[2, :-1], 1) + np.diag(chain[3, :-2], 2)
     learned = baum_welch(
-        GaussianHmm(chain[0], transition[:count, :count], means, variances),
+        Hmm(chain[0], transition[:count, :count], Gaussian(means, variances)),
         sequences,
+        learn=EMISSION,
         max_iterations=settings.refine_iterations,
-        learn_chain=False,
     )
-    return learned.model.means
+    return learned.model.emission.means

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.steps import Step, steps_of
+from hmcs.motion.steps import DeadZone, Step, steps_of_demonstration
 from hmcs.task import Task
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class LearningError(UserError):
@@ -25,10 +26,23 @@ class Segment(NamedTuple):
     """One performance of one gesteme."""
 
     demonstration: str
+    state: int
+    """Index of the task state it was performed in."""
     gesteme: int
+    """Index of the gesteme."""
     positions: Array
     """m, shape (T, 3)."""
     steps: tuple[Step, ...]
+
+
+class LabeledSteps(NamedTuple):
+    """The steps of a whole demonstration and what the operator was doing in each."""
+
+    steps: tuple[Step, ...]
+    states: Integers
+    """Index of the task state of each step, −1 where it has no label, shape (T,)."""
+    gestemes: Integers
+    """Index of the gesteme of each step, −1 where it has no label, shape (T,)."""
 
 
 def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Segment]:
@@ -51,8 +65,9 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
             samples = list(run)
             # A segment ends where the next begins: the sample that opens the next closes this one.
             stop = min(samples[-1] + 2, len(demonstration.positions))
-            positions = demonstration.positions[samples[0] : stop]
-            steps = tuple(steps_of(positions, task.dead_zone_m))
+            piece = demonstration.cut(samples[0], stop)
+            positions = piece.positions
+            steps = tuple(steps_of_demonstration(piece, task.dead_zone_m))
             if len(steps) < 2:
                 raise LearningError(
                     f"demonstration {demonstration.name!r}: the stretch labeled {label!r} from "
@@ -60,8 +75,8 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
                     f"{_extent(positions):.4f} m and makes {len(steps)} steps, but 2 are "
                     f"needed: demonstrate it larger or lower dead_zone_m ({task.dead_zone_m})"
                 )
-            gesteme = _gesteme_of(task, label, demonstration.name)
-            segments.append(Segment(demonstration.name, gesteme, positions, steps))
+            state, gesteme = _meant(task, label, demonstration.name)
+            segments.append(Segment(demonstration.name, state, gesteme, positions, steps))
         if not labeled:
             raise LearningError(
                 f"demonstration {demonstration.name!r} has no labels: add a column 'state' with "
@@ -70,15 +85,46 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
     return segments
 
 
-def _gesteme_of(task: Task, label: str, demonstration: str) -> int:
-    names = [gesteme.name for gesteme in task.gestemes]
+def labeled_steps(task: Task, demonstration: Demonstration) -> LabeledSteps:
+    """Return the steps of a demonstration, each with the label of the sample midway in it.
+
+    Raises LearningError for a label that is no state of the task.
+    """
+    meant = {
+        label: _meant(task, label, demonstration.name)
+        for label in set(demonstration.states)
+        if label is not None
+    } | {None: (-1, -1)}
+    zone, begin = DeadZone(task.dead_zone_m), 0
+    steps, labels = [], []
+    for end, position in enumerate(demonstration.positions):
+        step = zone.push(
+            position,
+            orientation=_row(demonstration.orientations, end),
+            wrench=_row(demonstration.wrenches, end),
+        )
+        if step is not None:
+            steps.append(step)
+            labels.append(meant[demonstration.states[(begin + end) // 2]])
+            begin = end
+    columns = np.array(labels, dtype=np.int64).reshape(-1, 2)
+    return LabeledSteps(tuple(steps), columns[:, 0], columns[:, 1])
+
+
+def _row(values: Array | None, k: int) -> Array | None:
+    return None if values is None else np.asarray(values[k])
+
+
+def _meant(task: Task, label: str, demonstration: str) -> tuple[int, int]:
+    """State and gesteme that a label names."""
     state_name, _, chosen = label.partition("/")
-    state = next((s for s in task.states if s.name == state_name), None)
-    if state is None:
+    found = [q for q, state in enumerate(task.states) if state.name == state_name]
+    if not found:
         raise LearningError(
             f"demonstration {demonstration!r}: label {label!r} is no state of task {task.name!r}; "
             f"states are {', '.join(s.name for s in task.states)}"
         )
+    state = task.states[found[0]]
     if not chosen and len(state.gestemes) == 1:
         chosen = state.gestemes[0]
     if chosen not in state.gestemes:
@@ -87,7 +133,7 @@ def _gesteme_of(task: Task, label: str, demonstration: str) -> int:
             f"of state {state_name!r}; write "
             + " or ".join(f"{state_name}/{name}" for name in state.gestemes)
         )
-    return names.index(chosen)
+    return found[0], [gesteme.name for gesteme in task.gestemes].index(chosen)
 
 
 def _extent(positions: Array) -> float:
