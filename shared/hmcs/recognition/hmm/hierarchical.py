@@ -12,17 +12,14 @@ Shapes: C children of an internal state, L production states in depth-first orde
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hmcs.errors import UserError
-from hmcs.recognition.hmm.emissions import Emission
 from hmcs.recognition.hmm.markov import Array, checked_rows
-from hmcs.recognition.hmm.model import Hmm
-
-E = TypeVar("E", bound=Emission)
+from hmcs.recognition.hmm.model import E, Hmm
 
 NodePath = tuple[str, ...]
 """The names from the root to a state of the tree."""
