@@ -212,6 +212,45 @@ def recognizers(
         show_kind(kind_named(name), Console())
 
 
+@app.command()
+def study(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which study; without it all are listed.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Equal seeds measure the same.")] = 1,
+    trials: Annotated[
+        int | None, typer.Option(metavar="N", help="How many; the study's own number by default.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Processes; one a processor by default.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Change a setting; may be repeated."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask scheduler to run on.")
+    ] = None,
+) -> None:
+    """Measure what recognition is worth: methods side by side on the same data."""
+    from hmcs_laboratory.command import list_studies, run_study
+
+    if name is None:
+        raise typer.Exit(list_studies())
+    raise typer.Exit(
+        run_study(
+            name,
+            seed=seed,
+            trials=trials,
+            workers=workers,
+            assignments=settings or (),
+            as_json_line=json,
+            cluster=cluster,
+        )
+    )
+
+
 @task_app.command()
 def check(
     file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],
