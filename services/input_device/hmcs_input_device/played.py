@@ -30,13 +30,20 @@ Played = Playback | ReEngaging
 def recorded(settings: InputDeviceSettings, task: Task) -> Played:
     """Return a source that plays the demonstration of the settings.
 
-    Raises UserError where there is none, it cannot be read, or it is too small to make one step.
+    Raises UserError where there is none, it cannot be read, it is too small to make one step, or it
+    has no labels to be marked.
     """
     if settings.demonstration is None:
         raise UserError(
             "demonstration: the source 'recorded' needs one: give a CSV file with --demonstration"
         )
-    source = _played(settings, read_csv(settings.demonstration))
+    demonstration = read_csv(settings.demonstration)
+    if settings.mark_switches and not demonstration.switches.any():
+        raise UserError(
+            f"{settings.demonstration}: has no labels, so that mark_switches has nothing to mark: "
+            "add a column 'state', or leave mark_switches off"
+        )
+    source = _played(settings, demonstration)
     dead_zone_m = settings.dead_zone_m or task.dead_zone_m
     if source.reach_m < dead_zone_m:
         raise UserError(
@@ -133,6 +140,12 @@ def _random_gesteme(
 
 
 def _played(settings: InputDeviceSettings, demonstration: Demonstration) -> Played:
-    passes = Passes(settings.speed, settings.repeat, settings.lead_in_s, settings.velocity_window_s)
+    passes = Passes(
+        settings.speed,
+        settings.repeat,
+        settings.lead_in_s,
+        settings.velocity_window_s,
+        settings.mark_switches,
+    )
     playback = Playback(demonstration, passes)
     return ReEngaging(playback, Reaction(settings.reaction_s)) if settings.re_engage else playback

@@ -131,11 +131,16 @@ class InputDevice(Service):
         origin = Origin(boot=self.bus.source.boot, seq=self._sent, captured_ns=now_ns)
         self._sent = self._motions.put(motion, origin).seq + 1
         if not motion.dead_man or motion.clutch:
-            self._zone.lift()
+            self._zone.lift(pedal=motion.pedal)
             return
-        made = self._zone.push(motion.position)
+        made = self._zone.push(
+            motion.position,
+            orientation=motion.orientation,
+            wrench=motion.wrench,
+            pedal=motion.pedal,
+        )
         if made is not None:
-            step = Step(index=made.index, position=made.position, displacement=made.displacement)
+            step = Step(**made._asdict())
             self._kept.append((step, origin))
             self._steps.put(step, origin)
 

@@ -37,6 +37,9 @@ class InputDeviceSettings(ServiceSettings):
     """How many times as fast as recorded."""
     velocity_window_s: float = Field(default=0.02, gt=0.0, le=1.0)
     """Velocities are differences over so much time before and after."""
+    mark_switches: bool = False
+    """The pedal goes down for a moment wherever another label of the motion begins, as a
+    recognizer with given restart needs it. Of `recorded` and `synthetic` only."""
     re_engage: bool = False
     """The operator of a recording who sees the robot stand lets go of the dead-man, waits, and
     presses again; the recording waits meanwhile. Of `recorded` and `synthetic` only."""

@@ -273,6 +273,47 @@ def test_motion_made_while_clutched_or_released_is_taken_out_of_the_steps(
         np.testing.assert_allclose(received.body.displacement, (0.03, 0, 0), atol=1e-12)
 
 
+def test_steps_tell_what_was_felt_and_signaled_and_are_told_again_alike(
+    make_desk: MakeDesk, hand: Hand
+) -> None:
+    desk = make_desk(source="hand", dead_zone_m=0.02)
+    turns = [np.array([0, 0, np.sin(a), np.cos(a)]) for a in (0.0, 0.2, 0.4, 0.6)]
+
+    def let(x_m: float, turn: int, **fields: Any) -> None:
+        hand.move(x_m, orientation=turns[turn], wrench=np.full(6, float(turn)), **fields)
+        count = len(desk.motions)
+        desk.until(lambda: len(desk.motions) > count + 3, "the device to be seen")
+
+    let(0.0, 0)
+    let(0.03, 1)
+    let(0.03, 1, pedal=True, dead_man=False)
+    let(0.03, 1, dead_man=False)
+    let(0.03, 1)
+    let(0.06, 2)
+    let(0.09, 3)
+    desk.until(lambda: len(desk.steps) == 3, "three steps")
+    steps = [received.body for received in desk.steps]
+    assert [step.mark for step in steps] == [False, True, False]
+    for k, step in enumerate(steps):
+        np.testing.assert_allclose(step.orientation, turns[k + 1], atol=1e-12)
+        assert k < step.wrench[0] <= k + 1
+        np.testing.assert_array_equal(step.wrench, step.wrench[0])
+    told = desk.ask("last_steps", LastStepsQuestion(count=10), LastSteps).steps
+    for step, again in zip(steps, told, strict=True):
+        for name in type(step).model_fields:
+            np.testing.assert_array_equal(getattr(step, name), getattr(again, name))
+
+
+def test_an_orientation_that_is_no_rotation_is_refused(make_desk: MakeDesk, hand: Hand) -> None:
+    desk = make_desk(source="hand", dead_zone_m=0.02)
+    hand.move(0.05, orientation=np.zeros(4))
+    desk.until(lambda: desk.bus.counters.refused["motion"] > 2, "refusals")
+    assert not desk.service.health()[0]
+    hand.move(0.05, orientation=np.array([0, 0, 1.0, 0]))
+    desk.until(lambda: desk.steps, "a step")
+    assert desk.service.health()[0]
+
+
 def test_a_sample_that_is_none_is_refused_counted_and_nothing_is_lost(
     make_desk: MakeDesk, hand: Hand
 ) -> None:

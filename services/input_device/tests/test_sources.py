@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from hmcs.errors import UserError
-from hmcs.motion.demonstrations import Demonstration, write_csv
+from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.motion.paths import Path as Curve
 from hmcs.motion.steps import steps_of
 from hmcs.task import find_task, load_task
@@ -65,6 +66,11 @@ def test_a_dead_zone_larger_than_the_recording_is_an_error_before_it_starts(
         opened(source="recorded", demonstration=small, dead_zone_m=0.15)
 
 
+def test_switches_of_a_recording_without_labels_cannot_be_marked(line_file: Path) -> None:
+    with pytest.raises(UserError, match=r"no labels.*add a column 'state'"):
+        opened(source="recorded", demonstration=line_file, mark_switches=True)
+
+
 # --- synthetic ------------------------------------------------------------------------------------
 
 
@@ -84,6 +90,14 @@ def test_it_starts_where_the_robot_does_and_stays_on_the_axes_that_are_looked_at
 def test_it_makes_steps_for_every_shipped_task() -> None:
     for task in (SHAPES, LINES):
         assert len(steps_of(played(opened(task.name)), task.dead_zone_m)) > 20
+
+
+def test_it_marks_where_another_state_is_performed() -> None:
+    source = opened(LINES.name, demonstration=LINES_CSV, noise=0, mark_switches=True)
+    samples = [source.sample(k / 100) for k in range(int(source.duration_s * 100))]
+    down = np.array([sample is not None and sample.pedal for sample in samples])
+    lines = sum(1 for _ in groupby(read_csv(LINES_CSV).states))
+    assert np.diff(down.astype(int), prepend=0).clip(0).sum() == lines > 3
 
 
 def test_it_follows_the_lines_of_a_demonstration() -> None:
