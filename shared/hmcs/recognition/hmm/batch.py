@@ -32,8 +32,9 @@ Mask = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 _TRUSTED_NATS = 600.0
-"""A sequence is scored scaled if its log-likelihood is at most this below the sum of its best
-log-emissions: a path lost to underflow (below exp(−708)) then is at most exp(−108) of it."""
+"""With each step's likelihoods divided by their largest, no factor is above one. A path lost to
+underflow is below exp(−708) then, and where the sequence as a whole is above minus this, below
+exp(−108) of it. Any other sequence is smoothed in logarithms, by itself and more slowly."""
 
 
 def baum_welch_many(
@@ -216,14 +217,14 @@ class _Batch(NamedTuple):
 
 
 class _Forward(NamedTuple):
-    """Scaled forward variables; of a sequence not trusted they mean nothing."""
+    """Forward variables; of a sequence not trusted they mean nothing."""
 
     likelihood: Array
     """P(o_t | state i) divided by the largest of all states, shape (T, M, K, N); 0 in padding."""
-    states: Array
-    """P(state i at t | o_1..o_t), shape (T, M, K, N)."""
-    scales: Array
-    """Shape (T, M, K, 1); 1 in padding."""
+    joint: Array
+    """α with these likelihoods, shape (T, M, K, N); 0 in padding."""
+    total: Array
+    """P of each sequence with these likelihoods, shape (M, K); 1 of one that is none."""
     trusted: Mask
     """Shape (M, K)."""
     log_likelihoods: Array
@@ -232,8 +233,8 @@ class _Forward(NamedTuple):
     def only(self, kept: Mask) -> _Forward:
         return _Forward(
             self.likelihood[:, kept],
-            self.states[:, kept],
-            self.scales[:, kept],
+            self.joint[:, kept],
+            self.total[kept],
             self.trusted[kept],
             self.log_likelihoods[kept],
         )
@@ -302,55 +303,49 @@ def _stacked(emissions: Sequence[Discrete | Gaussian]) -> _Emissions:
 
 
 def _forward(batch: _Batch, log_emission: Array) -> _Forward:
-    steps = len(log_emission)
+    steps, models, sequences, _ = log_emission.shape
     present = np.arange(steps)[:, None, None] < batch.lengths
-    top = log_emission.max(axis=3)
+    top = log_emission[..., 0]
+    for n in range(1, log_emission.shape[3]):
+        top = np.maximum(top, log_emission[..., n])
     top = np.where(present & np.isfinite(top), top, 0.0)
-    likelihood = np.exp(log_emission - top[..., None])
+    likelihood = log_emission - top[..., None]
+    np.exp(likelihood, out=likelihood)
     likelihood *= present[..., None]
-    padding = (~present).astype(np.float64)[..., None]
-    states = np.empty_like(likelihood)
-    scales = np.empty_like(padding)
-    # An impossible sequence divides by zero; it is not trusted and so not read.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for t in range(steps):
-            predicted = batch.initial[:, None] if t == 0 else states[t - 1] @ batch.transition
-            joint = np.multiply(predicted, likelihood[t], out=states[t])
-            np.add(joint.sum(axis=2, keepdims=True), padding[t], out=scales[t])
-            joint /= scales[t]
-        log_scales = np.log(scales[..., 0]).sum(axis=0)
-    trusted = log_scales > -_TRUSTED_NATS
-    log_likelihoods = log_scales + top.sum(axis=0)
+    joint = np.empty_like(likelihood)
+    np.multiply(batch.initial[:, None], likelihood[0], out=joint[0])
+    for t in range(1, steps):
+        np.matmul(joint[t - 1], batch.transition, out=joint[t])
+        joint[t] *= likelihood[t]
+    end = joint[batch.lengths - 1, np.arange(models)[:, None], np.arange(sequences)]
+    total = np.where(batch.lengths > 0, end.sum(axis=2), 1.0)
+    with np.errstate(divide="ignore"):
+        log_total = np.log(total)
+    trusted = log_total > -_TRUSTED_NATS
+    log_likelihoods = log_total + top.sum(axis=0)
     for m, k in np.argwhere(~trusted):
         log_likelihoods[m, k] = log_likelihood(
             batch.initial[m], batch.transition[m], log_emission[: batch.lengths[m, k], m, k]
         )
-    return _Forward(likelihood, states, scales, trusted, log_likelihoods)
+    return _Forward(likelihood, joint, total, trusted, log_likelihoods)
 
 
 def _expected(batch: _Batch, passed: _Forward, log_emission: Array) -> _Expected:
     steps = len(log_emission)
-    last = (np.arange(1, steps + 1)[:, None, None] == batch.lengths).astype(np.float64)[..., None]
+    # What would come next in padding has no likelihood, so that β ends where its sequence does.
+    last = np.arange(1, steps + 1)[:, None, None] == batch.lengths
+    end = (last & passed.trusted) / np.where(passed.trusted, passed.total, 1.0)
     backward_transition = np.ascontiguousarray(batch.transition.swapaxes(1, 2))
-    beta = np.empty_like(passed.states)
-    # b β / c of the next step; what is observed next in padding has no likelihood, so that β ends
-    # where its sequence does.
-    ahead = np.zeros_like(passed.states)
-    beta[-1] = last[-1]
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        weight = passed.likelihood / passed.scales
-        for t in range(steps - 2, -1, -1):
-            np.multiply(weight[t + 1], beta[t + 1], out=ahead[t])
-            np.matmul(ahead[t], backward_transition, out=beta[t])
-            beta[t] += last[t]
-        states = passed.states * beta
-    doubtful = np.argwhere(~passed.trusted)
-    before = passed.states
-    if len(doubtful):
-        before = np.where(passed.trusted[..., None], before, 0.0)
-        ahead = np.where(passed.trusted[..., None], ahead, 0.0)
-    transitions = batch.transition * (_by_model(before).swapaxes(1, 2) @ _by_model(ahead))
-    for m, k in doubtful:
+    beta = np.empty_like(passed.joint)
+    ahead = np.zeros_like(passed.joint)
+    beta[-1] = end[-1, ..., None]
+    for t in range(steps - 2, -1, -1):
+        np.multiply(passed.likelihood[t + 1], beta[t + 1], out=ahead[t])
+        np.matmul(ahead[t], backward_transition, out=beta[t])
+        beta[t] += end[t, ..., None]
+    states = passed.joint * beta
+    transitions = batch.transition * (_by_model(passed.joint).swapaxes(1, 2) @ _by_model(ahead))
+    for m, k in np.argwhere(~passed.trusted):
         length = batch.lengths[m, k]
         try:
             with naming_the_observation(batch.observations[:, m, k], int(k)):
@@ -359,7 +354,6 @@ def _expected(batch: _Batch, passed: _Forward, log_emission: Array) -> _Expected
                 )
         except UserError as error:
             raise type(error)(f"model {batch.numbers[m]}: {error}") from error
-        states[:, m, k] = 0.0
         states[:length, m, k] = smoothed.states
         transitions[m] += smoothed.transitions
     return _Expected(states, transitions)

@@ -26,6 +26,7 @@ from hmcs.recognition.hmm.inference import (
 )
 
 E = TypeVar("E", bound=Emission)
+D = TypeVar("D", bound=DrawingEmission)
 
 _TOLERANCE = 1e-8
 """How far sums of probabilities may be from one."""
@@ -113,7 +114,7 @@ def log_emission(model: Hmm[E], observations: Observations) -> Array:
     return model.emission.log_likelihood(observations)
 
 
-def sample(model: Hmm[DrawingEmission], steps: int, rng: np.random.Generator) -> Sample:
+def sample(model: Hmm[D], steps: int, rng: np.random.Generator) -> Sample:
     """Let the model run for `steps` observations, or until it leaves its states if that is sooner.
 
     Raises ModelError when `steps` is below 1 or the model is none.
