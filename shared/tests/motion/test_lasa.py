@@ -1,4 +1,4 @@
-"""LASA drawings: all there, from their own first point; one clear line where they cannot be read."""
+"""LASA drawings: all there, each from its own first point; one line where they cannot be read."""
 
 import importlib.util
 import sys

@@ -1,0 +1,121 @@
+"""The laboratory's command line; `hmcs study` passes through to `run_study`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from hmcs.errors import UserError
+from hmcs.task.model import unknown
+from hmcs_laboratory.report import as_json, as_table, progress_shown, studies_table
+from hmcs_laboratory.running import measure
+from hmcs_laboratory.studies import STUDIES
+from hmcs_laboratory.study import Study, StudySettings
+
+USER_MISTAKE = 2
+INTERRUPTED = 130
+
+
+def find_study(name: str) -> Study[StudySettings]:
+    """Return the study of that name; raises UserError naming all where there is none."""
+    for study in STUDIES:
+        if study.name == name:
+            return study
+    raise UserError(unknown("study", name, [study.name for study in STUDIES]))
+
+
+def list_studies() -> int:
+    """Print all studies; return the exit code."""
+    Console().print(studies_table(STUDIES))
+    return 0
+
+
+def run_study(
+    name: str,
+    *,
+    seed: int = 1,
+    trials: int | None = None,
+    workers: int | None = None,
+    assignments: Sequence[str] = (),
+    as_json_line: bool = False,
+    cluster: str | None = None,
+) -> int:
+    """Run a study and print its table, or one line of JSON; return the exit code.
+
+    `assignments` are the settings to change, `NAME=VALUE` each. Progress goes to standard error.
+    Ctrl-C ends with 130. Raises UserError as `measure` and `Study.settings_from` do.
+    """
+    study = find_study(name)
+    settings = study.settings_from(assignments)
+    console = Console(stderr=True)
+    try:
+        with progress_shown(console, name, trials or study.trials) as told:
+            result = measure(
+                study,
+                settings,
+                seed=seed,
+                trials=trials,
+                workers=workers,
+                cluster=cluster,
+                progress=told,
+            )
+    except KeyboardInterrupt:
+        console.print(f"{name}: interrupted")
+        return INTERRUPTED
+    if as_json_line:
+        print(as_json(result))
+    else:
+        Console().print(as_table(result))
+    return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments; return the exit code, 2 for a mistake of the user."""
+    parser = argparse.ArgumentParser(prog="hmcs_laboratory", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    _add_study(commands.add_parser("study", help="measure methods of recognition"))
+    given = parser.parse_args(argv)
+    try:
+        return _study(given, parser)
+    except UserError as error:
+        print(f"hmcs_laboratory: {error}", file=sys.stderr)
+        return USER_MISTAKE
+
+
+def _add_study(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", nargs="?", metavar="NAME", help="which study; --list shows all")
+    parser.add_argument("--list", action="store_true", help="list the studies and end")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--trials", type=int, metavar="N", help="how many; the study's by default")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes; one a processor by default"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="assignments",
+        metavar="NAME=VALUE",
+        help="change a setting; may be repeated",
+    )
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler to run on")
+
+
+def _study(given: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
+    if given.list:
+        return list_studies()
+    if given.name is None:
+        parser.error("name a study, or --list them")
+    return run_study(
+        given.name,
+        seed=given.seed,
+        trials=given.trials,
+        workers=given.workers,
+        assignments=given.assignments,
+        as_json_line=given.json,
+        cluster=given.cluster,
+    )

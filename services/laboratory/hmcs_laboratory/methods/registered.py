@@ -1,0 +1,83 @@
+"""The lists: which methods studies compare. Adding one is one line here."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, TypeVar
+
+from pydantic import AfterValidator
+
+from hmcs.task.model import unknown
+from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols
+from hmcs_laboratory.methods.online import OnlineMethod
+from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm, learn_window_trees
+from hmcs_laboratory.methods.ours import fit_ours
+from hmcs_laboratory.methods.recognizers import registered_recognizers
+from hmcs_laboratory.methods.series import fit_dtw, fit_rocket
+from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
+from hmcs_laboratory.methods.whole import WholeMethod
+
+WHOLE = (
+    WholeMethod("hmcs-gestemes", "hmcs.recognition.gestemes", fit_ours),
+    WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian),
+    WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on k-means symbols", fit_symbols),
+    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw),
+    WholeMethod("minirocket", "aeon MiniRocketClassifier on positions", fit_rocket),
+    WholeMethod("svm", "scikit-learn SVC on 12 points and log length", fit_svm),
+    WholeMethod("lda", "scikit-learn shrinkage LDA on the same", fit_lda),
+    WholeMethod("extra-trees", "scikit-learn ExtraTreesClassifier on windows", fit_trees),
+)
+"""Methods that classify a whole gesteme."""
+
+ONLINE_PEERS = (
+    OnlineMethod(
+        "extra-trees-window", "scikit-learn ExtraTreesClassifier on windows", learn_window_trees
+    ),
+    OnlineMethod(
+        "concatenated-hmm", "one Gaussian HMM of all states on directions", learn_concatenated_hmm
+    ),
+)
+"""Methods that follow a task, beside our recognizers."""
+
+
+@cache
+def online_methods() -> tuple[OnlineMethod, ...]:
+    """Return the methods that follow a task: all registered recognizers, and the peers."""
+    return (*registered_recognizers(), *ONLINE_PEERS)
+
+
+Method = TypeVar("Method", WholeMethod, OnlineMethod)
+
+
+def _known(names: tuple[str, ...], choices: tuple[Method, ...]) -> tuple[str, ...]:
+    known = [method.name for method in choices]
+    for name in names:
+        if name not in known:
+            raise ValueError(unknown("method", name, known))
+    if len(set(names)) < len(names):
+        raise ValueError(f"{', '.join(names)}: expected every method once")
+    return names
+
+
+def _known_whole(names: tuple[str, ...]) -> tuple[str, ...]:
+    return _known(names, WHOLE)
+
+
+def _known_online(names: tuple[str, ...]) -> tuple[str, ...]:
+    return _known(names, online_methods())
+
+
+WholeNames = Annotated[tuple[str, ...], AfterValidator(_known_whole)]
+"""Names of methods that classify a whole gesteme; none stands for all."""
+OnlineNames = Annotated[tuple[str, ...], AfterValidator(_known_online)]
+"""Names of methods that follow a task; none stands for all."""
+
+
+def whole(names: tuple[str, ...]) -> tuple[WholeMethod, ...]:
+    """Return the methods of those names, or all for none."""
+    return tuple(method for method in WHOLE if not names or method.name in names)
+
+
+def online(names: tuple[str, ...]) -> tuple[OnlineMethod, ...]:
+    """Return the methods of those names, or all for none."""
+    return tuple(method for method in online_methods() if not names or method.name in names)

@@ -1,0 +1,28 @@
+"""The studies there are. Adding one is a file here and a line in `STUDIES`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hmcs_laboratory.studies.drawings import LASA
+from hmcs_laboratory.studies.gestemes import (
+    GESTEME_COUNT,
+    NOISE,
+    PARTIAL,
+    PEERS,
+    TRAINING_COUNT,
+)
+from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
+from hmcs_laboratory.study import Study
+
+STUDIES: tuple[Study[Any], ...] = (
+    PEERS,
+    NOISE,
+    GESTEME_COUNT,
+    TRAINING_COUNT,
+    PARTIAL,
+    RESTART,
+    ORDER,
+    LASA,
+    LASA_TASKS,
+)
