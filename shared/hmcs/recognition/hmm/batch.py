@@ -1,7 +1,8 @@
 """Baum–Welch of many hidden Markov models at once, vectorized over models and sequences.
 
 Shapes: M models of N states each; K sequences of a model at most, T observations of a sequence at
-most (fewer and shorter ones are padded); F dimensions, S symbols.
+most (fewer and shorter ones are padded); F dimensions, S symbols. Recursions over time run on
+(T, M, K, N), everything else on (M, N, T·K), whose last axis is long.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def baum_welch_many(
         if not going.any():
             break
         if not going.all():
-            batch, passed, emission = batch.only(going), passed.only(going), emission[:, going]
+            batch, passed, emission = batch.only(going), passed.only(going), emission[going]
         batch = _reestimated(batch, _expected(batch, passed, emission), learn)
         if learn.emission:
             emission = None
@@ -96,11 +97,11 @@ class _Emissions(Protocol):
     """The emissions of all models in one."""
 
     def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        """Shape (T, M, K, N); anything in padding."""
+        """Shape (M, N, T·K); anything in padding."""
         ...
 
     def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
-        """From γ, shape (T, M, K, N), zero in padding."""
+        """From γ, shape (M, N, T·K), zero in padding."""
         ...
 
     def only(self, kept: Mask) -> Self: ...
@@ -117,28 +118,28 @@ class _Gaussians:
     floors: Array  # (M,)
 
     def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        total = np.empty((*observations.shape[:3], self.means.shape[1]))
-        total[...] = -0.5 * np.log(2.0 * np.pi * self.variances).sum(axis=2)[:, None, :]
-        # A dimension at a time: four large arrays in turn stay in the cache, one of (…, N, F) not.
-        for f in range(self.means.shape[2]):
-            difference = observations[..., f, None] - self.means[:, None, :, f]
-            difference *= difference
-            difference *= (0.5 / self.variances[:, :, f])[:, None, :]
-            total -= difference
+        models, states, dimensions = self.means.shape
+        total = np.empty((models, states, observations.shape[2]))
+        total[...] = -0.5 * np.log(2.0 * np.pi * self.variances).sum(axis=2)[:, :, None]
+        half_precisions = 0.5 / self.variances
+        # A dimension at a time: arrays of this size stay in the cache, one of F times it does not.
+        for f in range(dimensions):
+            term = observations[:, f, None] - self.means[:, :, f, None]
+            term *= term
+            term *= half_precisions[:, :, f, None]
+            total -= term
         return total
 
     def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
-        weights = _by_model(states).swapaxes(1, 2)
-        vectors = _by_model(observations)
-        weight = weights.sum(axis=2)[:, :, None]
+        weight = states.sum(axis=2)[:, :, None]
         seen = weight > 1e-12
         safe = np.where(seen, weight, 1.0)
-        means = np.where(seen, weights @ vectors / safe, self.means)
+        means = np.where(seen, states @ observations.swapaxes(1, 2) / safe, self.means)
         spread = np.empty_like(means)
         for f in range(means.shape[2]):
-            difference = vectors[:, None, :, f] - means[:, :, f, None]
-            difference *= difference
-            spread[:, :, f] = np.einsum("mns,mns->mn", weights, difference)
+            term = observations[:, f, None] - means[:, :, f, None]
+            term *= term
+            spread[:, :, f] = np.einsum("mns,mns->mn", states, term)
         lowest = self.floors[:, None, None]
         variances = np.where(seen, np.maximum(spread / safe, lowest), self.variances)
         if not (variances > 0).all():
@@ -165,20 +166,15 @@ class _Discretes:
 
     def log_likelihood(self, observations: NDArray[Any]) -> Array:
         with np.errstate(divide="ignore"):
-            by_symbol = np.log(self.probabilities).swapaxes(1, 2)
-        model = np.arange(len(by_symbol))[:, None]
-        return np.asarray(by_symbol[model, observations])
+            log_probabilities = np.log(self.probabilities)
+        return np.take_along_axis(log_probabilities, observations[:, None], axis=2)
 
     def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
         models, count, symbols = self.probabilities.shape
-        cell = (observations + symbols * np.arange(models)[:, None]).ravel()
-        counts = np.stack(
-            [
-                np.bincount(cell, states[..., n].ravel(), models * symbols).reshape(models, symbols)
-                for n in range(count)
-            ],
-            axis=1,
-        )
+        row = np.arange(models * count).reshape(models, count, 1)
+        cell = symbols * row + observations[:, None]
+        counts = np.bincount(cell.ravel(), states.ravel(), models * count * symbols)
+        counts = counts.reshape(models, count, symbols)
         weight = counts.sum(axis=2, keepdims=True)
         share = counts / np.where(weight > 0, weight, 1.0)
         floors = np.repeat(self.floors, count)[:, None]
@@ -201,9 +197,15 @@ class _Batch(NamedTuple):
     transition: Array
     emissions: _Emissions
     observations: NDArray[Any]
-    """Shape (T, M, K) or (T, M, K, F), zero in padding."""
+    """Shape (M, T·K) or (M, F, T·K), zero in padding."""
     lengths: Integers
     """Shape (M, K), zero for a sequence that is none."""
+
+    def sequence(self, values: NDArray[Any], m: int, k: int) -> NDArray[Any]:
+        """Of values of shape (M, …, T·K) those of one sequence, time first."""
+        sequences = self.lengths.shape[1]
+        in_time = np.moveaxis(values[m], -1, 0)[k::sequences]
+        return np.asarray(in_time[: self.lengths[m, k]])
 
     def only(self, kept: Mask) -> _Batch:
         return _Batch(
@@ -211,7 +213,7 @@ class _Batch(NamedTuple):
             self.initial[kept],
             self.transition[kept],
             self.emissions.only(kept),
-            self.observations[:, kept],
+            self.observations[kept],
             self.lengths[kept],
         )
 
@@ -242,7 +244,7 @@ class _Forward(NamedTuple):
 
 class _Expected(NamedTuple):
     states: Array
-    """γ, shape (T, M, K, N); 0 in padding."""
+    """γ, shape (M, N, T·K); 0 in padding."""
     transitions: Array
     """Σ ξ over time and sequences, shape (M, N, N)."""
 
@@ -279,12 +281,13 @@ def _batch(models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations
     for m, own in enumerate(sequences):
         for k, sequence in enumerate(own):
             observations[: len(sequence), m, k] = sequence
+    last_axis = np.moveaxis(observations, 1, 0).reshape(len(models), -1, *given[0].shape[1:])
     return _Batch(
         np.arange(len(models)),
         np.stack([model.initial for model in models]),
         np.stack([model.transition for model in models]),
         _stacked([model.emission for model in models]),
-        observations,
+        np.ascontiguousarray(np.moveaxis(last_axis, 1, -1)),
         lengths,
     )
 
@@ -303,15 +306,18 @@ def _stacked(emissions: Sequence[Discrete | Gaussian]) -> _Emissions:
 
 
 def _forward(batch: _Batch, log_emission: Array) -> _Forward:
-    steps, models, sequences, _ = log_emission.shape
-    present = np.arange(steps)[:, None, None] < batch.lengths
-    top = log_emission[..., 0]
-    for n in range(1, log_emission.shape[3]):
-        top = np.maximum(top, log_emission[..., n])
+    models, states, _ = log_emission.shape
+    sequences = batch.lengths.shape[1]
+    steps = log_emission.shape[2] // sequences
+    present = np.arange(steps)[:, None] < batch.lengths[:, None]
+    present = present.reshape(models, steps * sequences)
+    top = log_emission.max(axis=1)
     top = np.where(present & np.isfinite(top), top, 0.0)
-    likelihood = log_emission - top[..., None]
-    np.exp(likelihood, out=likelihood)
-    likelihood *= present[..., None]
+    ratio = log_emission - top[:, None]
+    np.exp(ratio, out=ratio)
+    ratio *= present[:, None]
+    in_time = ratio.reshape(models, states, steps, sequences).transpose(2, 0, 3, 1)
+    likelihood = np.ascontiguousarray(in_time)
     joint = np.empty_like(likelihood)
     np.multiply(batch.initial[:, None], likelihood[0], out=joint[0])
     for t in range(1, steps):
@@ -322,16 +328,16 @@ def _forward(batch: _Batch, log_emission: Array) -> _Forward:
     with np.errstate(divide="ignore"):
         log_total = np.log(total)
     trusted = log_total > -_TRUSTED_NATS
-    log_likelihoods = log_total + top.sum(axis=0)
+    log_likelihoods = log_total + top.reshape(models, steps, sequences).sum(axis=1)
     for m, k in np.argwhere(~trusted):
         log_likelihoods[m, k] = log_likelihood(
-            batch.initial[m], batch.transition[m], log_emission[: batch.lengths[m, k], m, k]
+            batch.initial[m], batch.transition[m], batch.sequence(log_emission, m, k)
         )
     return _Forward(likelihood, joint, total, trusted, log_likelihoods)
 
 
 def _expected(batch: _Batch, passed: _Forward, log_emission: Array) -> _Expected:
-    steps = len(log_emission)
+    steps, models, _, count = passed.joint.shape
     # What would come next in padding has no likelihood, so that β ends where its sequence does.
     last = np.arange(1, steps + 1)[:, None, None] == batch.lengths
     end = (last & passed.trusted) / np.where(passed.trusted, passed.total, 1.0)
@@ -343,26 +349,27 @@ def _expected(batch: _Batch, passed: _Forward, log_emission: Array) -> _Expected
         np.multiply(passed.likelihood[t + 1], beta[t + 1], out=ahead[t])
         np.matmul(ahead[t], backward_transition, out=beta[t])
         beta[t] += end[t, ..., None]
-    states = passed.joint * beta
+    beta *= passed.joint
+    states = np.ascontiguousarray(beta.transpose(1, 3, 0, 2)).reshape(models, count, -1)
     transitions = batch.transition * (_by_model(passed.joint).swapaxes(1, 2) @ _by_model(ahead))
     for m, k in np.argwhere(~passed.trusted):
-        length = batch.lengths[m, k]
         try:
-            with naming_the_observation(batch.observations[:, m, k], int(k)):
+            with naming_the_observation(batch.sequence(batch.observations, m, k), int(k)):
                 smoothed = smooth(
-                    batch.initial[m], batch.transition[m], log_emission[:length, m, k]
+                    batch.initial[m], batch.transition[m], batch.sequence(log_emission, m, k)
                 )
         except UserError as error:
             raise type(error)(f"model {batch.numbers[m]}: {error}") from error
-        states[:length, m, k] = smoothed.states
+        batch.sequence(states, m, k)[...] = smoothed.states
         transitions[m] += smoothed.transitions
     return _Expected(states, transitions)
 
 
 def _reestimated(batch: _Batch, expected: _Expected, learn: Parts) -> _Batch:
     if learn.initial:
+        first = expected.states[:, :, : batch.lengths.shape[1]].sum(axis=2)
         sequences = (batch.lengths > 0).sum(axis=1, keepdims=True)
-        batch = batch._replace(initial=expected.states[0].sum(axis=1) / sequences)
+        batch = batch._replace(initial=first / sequences)
     if learn.transition:
         batch = batch._replace(transition=renormalized(expected.transitions, batch.transition))
     if learn.emission:
