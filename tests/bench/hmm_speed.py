@@ -119,13 +119,13 @@ def large_update(repeats: int) -> list[Figure]:
         rng.normal(size=(*shape, LARGE_DIMENSIONS)),
         rng.uniform(0.5, 2.0, size=(*shape, LARGE_DIMENSIONS)),
     )
-    seen = rng.normal(size=(50, LARGE_DIMENSIONS))
+    seen = rng.normal(size=(10, LARGE_DIMENSIONS))
     initial = np.broadcast_to(start_in(LARGE_STATES), shape)
     banks = [
         ForwardBank(initial, np.broadcast_to(transition, (*shape, LARGE_STATES)))
         for transition in (fully_connected(LARGE_STATES), left_right(LARGE_STATES, 0.2, skip=0.1))
     ]
-    times = fastest(repeats, *(lambda bank=bank: run(bank, scores, seen) for bank in banks))
+    times = fastest(10 * repeats, *(lambda bank=bank: run(bank, scores, seen) for bank in banks))
     return [
         Figure(
             f"filter update, {LARGE_MODELS} models × {LARGE_STATES} states, {name}",

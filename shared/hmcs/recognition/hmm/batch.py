@@ -8,8 +8,7 @@ most (fewer and shorter ones are padded); F dimensions, S symbols. Recursions ov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +21,19 @@ from hmcs.recognition.hmm.emissions import (
     ObservationError,
     Observations,
     check_spread,
-    floored,
 )
 from hmcs.recognition.hmm.inference import Array, log_likelihood, smooth
 from hmcs.recognition.hmm.learning import ALL, Learned, Parts, checked_sequences, renormalized
 from hmcs.recognition.hmm.model import Hmm, naming_the_observation
+from hmcs.recognition.hmm.stacked import (
+    Integers,
+    Mask,
+    StackedEmissions,
+    parameters_of,
+    stacked,
+)
 
 B = TypeVar("B", Discrete, Gaussian)
-Mask = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 _TRUSTED_NATS = 600.0
 """With each step's likelihoods divided by their largest, no factor is above one. A path lost to
@@ -93,101 +96,6 @@ def baum_welch_many(
     return tuple(Learned(*pair) for pair in zip(final, map(tuple, histories), strict=True))
 
 
-class _Emissions(Protocol):
-    """The emissions of all models in one."""
-
-    def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        """Shape (M, N, T·K); anything in padding."""
-        ...
-
-    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
-        """From γ, shape (M, N, T·K), zero in padding."""
-        ...
-
-    def only(self, kept: Mask) -> Self: ...
-
-    def of_model(self, at: int, like: Any) -> Any:
-        """The emission of one model, otherwise like the one it began with."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class _Gaussians:
-    means: Array  # (M, N, F)
-    variances: Array
-    floors: Array  # (M,)
-
-    def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        models, states, dimensions = self.means.shape
-        total = np.empty((models, states, observations.shape[2]))
-        total[...] = -0.5 * np.log(2.0 * np.pi * self.variances).sum(axis=2)[:, :, None]
-        half_precisions = 0.5 / self.variances
-        # A dimension at a time: arrays of this size stay in the cache, one of F times it does not.
-        for f in range(dimensions):
-            term = observations[:, f, None] - self.means[:, :, f, None]
-            term *= term
-            term *= half_precisions[:, :, f, None]
-            total -= term
-        return total
-
-    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
-        weight = states.sum(axis=2)[:, :, None]
-        seen = weight > 1e-12
-        safe = np.where(seen, weight, 1.0)
-        means = np.where(seen, states @ observations.swapaxes(1, 2) / safe, self.means)
-        spread = np.empty_like(means)
-        for f in range(means.shape[2]):
-            term = observations[:, f, None] - means[:, :, f, None]
-            term *= term
-            spread[:, :, f] = np.einsum("mns,mns->mn", states, term)
-        lowest = self.floors[:, None, None]
-        variances = np.where(seen, np.maximum(spread / safe, lowest), self.variances)
-        if not (variances > 0).all():
-            at, state, f = np.argwhere(~(variances > 0))[0]
-            raise ModelError(
-                f"model {numbers[at]}: the variance of state {state} in dimension {f} becomes 0: "
-                "learn with a variance_floor"
-            )
-        return replace(self, means=means, variances=variances)
-
-    def only(self, kept: Mask) -> Self:
-        return replace(
-            self, means=self.means[kept], variances=self.variances[kept], floors=self.floors[kept]
-        )
-
-    def of_model(self, at: int, like: Gaussian) -> Gaussian:
-        return replace(like, means=self.means[at], variances=self.variances[at])
-
-
-@dataclass(frozen=True, eq=False)
-class _Discretes:
-    probabilities: Array  # (M, N, S)
-    floors: Array  # (M,)
-
-    def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        with np.errstate(divide="ignore"):
-            log_probabilities = np.log(self.probabilities)
-        return np.take_along_axis(log_probabilities, observations[:, None], axis=2)
-
-    def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
-        models, count, symbols = self.probabilities.shape
-        row = np.arange(models * count).reshape(models, count, 1)
-        cell = symbols * row + observations[:, None]
-        counts = np.bincount(cell.ravel(), states.ravel(), models * count * symbols)
-        counts = counts.reshape(models, count, symbols)
-        weight = counts.sum(axis=2, keepdims=True)
-        share = counts / np.where(weight > 0, weight, 1.0)
-        floors = np.repeat(self.floors, count)[:, None]
-        rows = floored(share.reshape(models * count, symbols), floors).reshape(counts.shape)
-        return replace(self, probabilities=np.where(weight > 0, rows, self.probabilities))
-
-    def only(self, kept: Mask) -> Self:
-        return replace(self, probabilities=self.probabilities[kept], floors=self.floors[kept])
-
-    def of_model(self, at: int, like: Discrete) -> Discrete:
-        return replace(like, probabilities=self.probabilities[at])
-
-
 class _Batch(NamedTuple):
     """Models still learning, and their sequences."""
 
@@ -195,7 +103,7 @@ class _Batch(NamedTuple):
     """Which of the given models these are, shape (M,)."""
     initial: Array
     transition: Array
-    emissions: _Emissions
+    emissions: StackedEmissions
     observations: NDArray[Any]
     """Shape (M, T·K) or (M, F, T·K), zero in padding."""
     lengths: Integers
@@ -258,17 +166,13 @@ def _check(
             check_spread(sequences, model.emission.variance_floor)
     except (ModelError, ObservationError) as error:
         raise type(error)(f"model {m}: {error}") from error
-    shapes = [_parameters(each.emission).shape for each in (model, first)]
+    shapes = [parameters_of(each.emission).shape for each in (model, first)]
     if type(model.emission) is not type(first.emission) or shapes[0] != shapes[1]:
         raise ModelError(
             f"model {m} has {type(model.emission).__name__} emissions of shape {shapes[0]}, model "
             f"0 {type(first.emission).__name__} of {shapes[1]}: learn models of different shape "
             "in calls of their own"
         )
-
-
-def _parameters(emission: Discrete | Gaussian) -> Array:
-    return emission.means if isinstance(emission, Gaussian) else emission.probabilities
 
 
 def _batch(models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations]]) -> _Batch:
@@ -286,23 +190,10 @@ def _batch(models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations
         np.arange(len(models)),
         np.stack([model.initial for model in models]),
         np.stack([model.transition for model in models]),
-        _stacked([model.emission for model in models]),
+        stacked([model.emission for model in models]),
         np.ascontiguousarray(np.moveaxis(last_axis, 1, -1)),
         lengths,
     )
-
-
-def _stacked(emissions: Sequence[Discrete | Gaussian]) -> _Emissions:
-    parameters = np.stack([_parameters(emission) for emission in emissions])
-    gaussians = [emission for emission in emissions if isinstance(emission, Gaussian)]
-    if gaussians:
-        return _Gaussians(
-            parameters,
-            np.stack([emission.variances for emission in gaussians]),
-            np.array([emission.variance_floor for emission in gaussians]),
-        )
-    discretes = [emission for emission in emissions if isinstance(emission, Discrete)]
-    return _Discretes(parameters, np.array([emission.floor for emission in discretes]))
 
 
 def _forward(batch: _Batch, log_emission: Array) -> _Forward:

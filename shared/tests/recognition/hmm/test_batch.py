@@ -101,6 +101,19 @@ def test_sequences_far_from_the_model_are_learned_exactly():
     assert_equal_one_by_one(models, sequences, max_iterations=4, tolerance=-np.inf)
 
 
+def test_a_path_that_underflows_and_comes_back_is_not_lost():
+    # After the first observation one state is below the smallest double; after the second the
+    # other is nearly as improbable, and the first counts again.
+    apart = np.sqrt(2 * 746.0)
+    there = (740.0 + apart**2 / 2) / apart
+    means = np.array([[0.0], [apart]])
+    model = Hmm(np.array([0.5, 0.5]), np.eye(2), Gaussian(means, np.ones((2, 1))))
+    (learned,) = assert_equal_one_by_one(
+        [model], [[np.array([[0.0], [there]])]], max_iterations=1, tolerance=-np.inf
+    )
+    assert learned.model.initial[1] == pytest.approx(1 / (1 + np.exp(6.0)))
+
+
 def test_integers_are_as_good_as_floats_for_gaussians():
     chain = start_in(2), left_right(2, 0.3)
     models = [Hmm(*chain, Gaussian(np.array([[0.0], [5.0]]), np.ones((2, 1))))]
