@@ -178,21 +178,34 @@ def train(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="A setting of the recognizer."),
     ] = None,
+    choices: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--choose",
+            metavar="NAME=A,B,…",
+            help="Choose a setting by what it is worth on demonstrations left out.",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of what is drawn at random in learning.")] = 0,
 ) -> None:
     """Learn a model of a task from demonstrations."""
+    from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
 
-    model = learn(
-        task,
-        demonstrations,
-        output,
-        name=name,
-        recognizer=recognizer,
-        settings=dict(_setting(item) for item in settings or []),
-        seed=seed,
-        progress=typer.echo,
-    )
+    alternatives = {name: value.split(",") for name, value in map(_setting, choices or [])}
+    with fits_shown(bool(alternatives)) as fits:
+        model = learn(
+            task,
+            demonstrations,
+            output,
+            name=name,
+            recognizer=recognizer,
+            settings=dict(map(_setting, settings or [])),
+            choices=alternatives,
+            seed=seed,
+            progress=typer.echo,
+            fits=fits,
+        )
     typer.echo(f"{output}: model {model.name} for the recognizer {model.recognizer}")
 
 
