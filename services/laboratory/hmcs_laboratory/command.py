@@ -18,6 +18,9 @@ from hmcs_laboratory.study import Study, StudySettings
 USER_MISTAKE = 2
 INTERRUPTED = 130
 
+_WIDTH = 160
+"""Of tables that go to no terminal, characters."""
+
 
 def find_study(name: str) -> Study[StudySettings]:
     """Return the study of that name; raises UserError naming all where there is none."""
@@ -29,7 +32,7 @@ def find_study(name: str) -> Study[StudySettings]:
 
 def list_studies() -> int:
     """Print all studies; return the exit code."""
-    Console().print(studies_table(STUDIES))
+    _stdout().print(studies_table(STUDIES))
     return 0
 
 
@@ -68,7 +71,7 @@ def run_study(
     if as_json_line:
         print(as_json(result))
     else:
-        Console().print(as_table(result))
+        _stdout().print(as_table(result))
     return 0
 
 
@@ -83,6 +86,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"hmcs_laboratory: {error}", file=sys.stderr)
         return USER_MISTAKE
+
+
+def _stdout() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=_WIDTH)
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:

@@ -24,11 +24,14 @@ def as_json(result: StudyResult) -> str:
 
 def as_table(result: StudyResult) -> Table:
     """Return the result as a table: mean ± half width of the 95 % interval."""
+    # Folded rather than cut short where the screen is too narrow.
     table = Table(title=f"{result.study}: {result.trials} trials, seed {result.seed}")
     columns = list(dict.fromkeys(name for row in result.rows for name in row))
     for column in columns:
         if not column.endswith(CI95):
-            table.add_column(column, justify="left" if column == "method" else "right")
+            table.add_column(
+                column, justify="left" if column == "method" else "right", overflow="fold"
+            )
     for row in result.rows:
         table.add_row(*(_cell(row, name) for name in columns if not name.endswith(CI95)))
     return table

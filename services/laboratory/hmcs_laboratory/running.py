@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import signal
-import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import metadata
@@ -68,13 +68,22 @@ def measure(
         pool = joblib.Parallel(
             n_jobs=-1 if cluster else min(workers or joblib.cpu_count(), count),
             return_as="generator",
-            # As they come: a worker takes its next trial when it is done with one.
+            # A worker takes its next trial when it is done with one.
             batch_size=1,
-            pre_dispatch="all",
+            pre_dispatch="n_jobs",
         )
-        for trial in pool(jobs):
-            measured.append(trial)
-            progress(len(measured))
+        with _interrupts_kept_from_workers():
+            outcomes = pool(jobs)
+        try:
+            for outcome in outcomes:
+                measured.append(outcome)
+                progress(len(measured))
+        except KeyboardInterrupt:
+            with warnings.catch_warnings():
+                # Joblib warns that trials under way are lost: that is what was asked for.
+                warnings.simplefilter("ignore")
+                outcomes.close()
+            raise
     return StudyResult(
         study.name,
         seed,
@@ -101,18 +110,19 @@ def _trial(
     settings: Settings,
     stream: np.random.SeedSequence,
 ) -> Sequence[Measured]:
-    _leave_interrupts_to_the_parent()
     # With one thread sums are added up in the same order everywhere, and times compare.
     with threadpool_limits(1):
         return trial(settings, np.random.default_rng(stream))
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    import multiprocessing
-
-    worker = multiprocessing.parent_process() is not None
-    if worker and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _interrupts_kept_from_workers() -> Iterator[None]:
+    """Start processes that Ctrl-C does not reach: this one ends them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -128,7 +138,7 @@ def _backend(cluster: str | None) -> Iterator[None]:
             "--cluster needs Dask: install the extra hmcs-laboratory[cluster]"
         ) from error
     try:
-        client = Client(cluster, timeout="10s")  # type: ignore[no-untyped-call]
+        client = Client(cluster, timeout="5s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise UserError(
             f"--cluster {cluster}: no Dask scheduler there ({error}): start one with "

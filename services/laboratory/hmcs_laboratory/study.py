@@ -88,13 +88,13 @@ class Study(Generic[Settings]):
             return self.settings.model_validate(given)
         except ValidationError as error:
             found = error.errors(include_url=False)[0]
-            name = str(found["loc"][0]) if found["loc"] else "settings"
             what = found["msg"].removeprefix("Value error, ")
-            about = self.settings.model_fields[name].description if found["loc"] else None
-            raise UserError(
-                f"study {self.name!r}: {name}={given.get(name, '')}: {what}"
-                + (f" ({' '.join(about.split())})" if about else "")
-            ) from error
+            if found["loc"]:
+                name = str(found["loc"][0])
+                about = self.settings.model_fields[name].description
+                what = f"{name}={given[name]}: {what}"
+                what += f" ({' '.join(about.split())})" if about else ""
+            raise UserError(f"study {self.name!r}: {what}") from error
 
 
 def _is_several(settings: type[BaseModel], name: str) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy.special import stdtrit
 
 from hmcs_laboratory.study import Measured
 
@@ -31,7 +31,7 @@ def mean_ci95(values: ArrayLike) -> tuple[float | None, float | None]:
     if len(sample) < 2:
         return mean, None
     standard_error = float(sample.std(ddof=1)) / np.sqrt(len(sample))
-    return mean, float(stats.t.ppf(0.975, len(sample) - 1) * standard_error)
+    return mean, float(stdtrit(len(sample) - 1, 0.975) * standard_error)
 
 
 def rows_of(trials: Sequence[Sequence[Measured]]) -> list[Row]:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from hmcs.errors import UserError
 from hmcs.motion.operators import Operator, OperatorStuckError, Trace, follow
@@ -18,7 +18,15 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(gt=0, le=1)]
-Range = tuple[Positive, Positive]
+
+
+def _rising(bounds: tuple[float, float]) -> tuple[float, float]:
+    if bounds[0] > bounds[1]:
+        raise ValueError("expected the lower one first")
+    return bounds
+
+
+Range = Annotated[tuple[Positive, Positive], AfterValidator(_rising)]
 
 
 class HandSettings(StudySettings):

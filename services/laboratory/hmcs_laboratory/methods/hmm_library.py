@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.cluster import KMeans
 
 from hmcs_laboratory.methods.features import directions, flat
 from hmcs_laboratory.methods.libraries import peer
@@ -48,6 +49,11 @@ class SymbolHmms:
         return np.array([model.score(symbols) for model in self.models])
 
 
+def prepare(_examples: Examples) -> None:
+    """Import hmmlearn."""
+    peer("hmmlearn.hmm")
+
+
 def fit_gaussian(examples: Examples, rng: np.random.Generator) -> GaussianHmms:
     """Fit a `GaussianHMM` with diagonal covariances for each gesteme."""
     hmm = peer("hmmlearn.hmm")
@@ -76,8 +82,6 @@ def fit_gaussian(examples: Examples, rng: np.random.Generator) -> GaussianHmms:
 def fit_symbols(examples: Examples, rng: np.random.Generator) -> SymbolHmms:
     """Fit a `CategoricalHMM` for each gesteme, on symbols found by k-means in all directions."""
     hmm = peer("hmmlearn.hmm")
-    from sklearn.cluster import KMeans
-
     everything = np.concatenate([directions(positions) for positions in flat(examples)])
     symbols = min(SYMBOLS, len(np.unique(everything, axis=0)))
     codebook = KMeans(symbols, n_init=1, random_state=_seed(rng)).fit(everything)
@@ -117,10 +121,9 @@ def _pieces(observed: Array, count: int) -> list[Array]:
 
 
 def _fitted(model: Any, observed: Sequence[Array]) -> Any:
-    with warnings.catch_warnings():
-        # The last state of a left-right model is never left: its row of counts may be zero.
-        warnings.simplefilter("ignore")
-        return model.fit(np.concatenate(observed), [len(each) for each in observed])
+    # It warns of few data: that they are few is what is studied.
+    logging.getLogger("hmmlearn").setLevel(logging.ERROR)
+    return model.fit(np.concatenate(observed), [len(each) for each in observed])
 
 
 def _floored(emission: Array) -> Array:

@@ -33,38 +33,51 @@ class OnlineMethod:
 
 
 @dataclass(frozen=True)
+class Learned:
+    """A method that has learned a task."""
+
+    method: OnlineMethod
+    fresh: Fresh
+    fit_s: float
+    """Processor time of one thread."""
+
+
+@dataclass(frozen=True)
 class Followed:
     """What a method believed of the performances of a task."""
 
     beliefs: tuple[Array, ...]
     """Of each performance the probability of each state after each step, shape (T, S)."""
-    fit_s: float
-    us_per_sample: float
-    """Processor time of one thread."""
+    times: dict[str, float]
+    """`fit_s` and `us_per_sample`, processor time of one thread."""
 
 
-def followed(method: OnlineMethod, data: TaskSet, rng: np.random.Generator) -> Followed:
-    """Learn from the demonstrations and follow every performance, step by step."""
+def learned(method: OnlineMethod, data: TaskSet, rng: np.random.Generator) -> Learned:
+    """Learn from the demonstrations of a task."""
     began_s = time.thread_time()
     fresh = method.learn(data.task, data.demonstrations, rng)
-    fit_s = time.thread_time() - began_s
+    return Learned(method, fresh, time.thread_time() - began_s)
+
+
+def followed(what: Learned, performances: Sequence[Performance]) -> Followed:
+    """Follow every performance, step by step, each from the beginning of the task."""
     beliefs, spent_s = [], 0.0
-    for performance in data.performances:
-        recognizer = fresh()
-        shown = performance if method.marked else performance.unmarked()
+    for performance in performances:
+        recognizer = what.fresh()
+        shown = performance if what.method.marked else performance.unmarked()
         began_s = time.thread_time()
         states = [recognizer.step(step).belief.states for step in shown.steps]
         spent_s += time.thread_time() - began_s
         beliefs.append(np.array(states))
-    count = sum(len(performance.steps) for performance in data.performances)
-    return Followed(tuple(beliefs), fit_s, 1e6 * spent_s / count)
+    count = sum(len(performance.steps) for performance in performances)
+    return Followed(tuple(beliefs), {"fit_s": what.fit_s, "us_per_sample": 1e6 * spent_s / count})
 
 
 def state_measures(what: Followed, performances: Sequence[Performance]) -> dict[str, float]:
     """Return `state_accuracy`, delay and false switches of task states, and the times."""
     believed = [belief.argmax(axis=1) for belief in what.beliefs]
     measures = switch_measures("state_accuracy", [p.states for p in performances], believed)
-    return {**measures, "fit_s": what.fit_s, "us_per_sample": what.us_per_sample}
+    return {**measures, **what.times}
 
 
 def gesteme_measures(what: Followed, data: TaskSet) -> dict[str, float]:
@@ -77,7 +90,7 @@ def gesteme_measures(what: Followed, data: TaskSet) -> dict[str, float]:
     believed = [(belief @ shares).argmax(axis=1) for belief in what.beliefs]
     true = [gesteme[performance.states] for performance in data.performances]
     measures = switch_measures("gesteme_accuracy", true, believed)
-    return {**measures, "fit_s": what.fit_s, "us_per_sample": what.us_per_sample}
+    return {**measures, **what.times}
 
 
 def switch_measures(

@@ -8,21 +8,21 @@ from typing import Annotated, TypeVar
 from pydantic import AfterValidator
 
 from hmcs.task.model import unknown
-from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols
+from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols, prepare
 from hmcs_laboratory.methods.online import OnlineMethod
 from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm, learn_window_trees
 from hmcs_laboratory.methods.ours import fit_ours
 from hmcs_laboratory.methods.recognizers import registered_recognizers
-from hmcs_laboratory.methods.series import fit_dtw, fit_rocket
+from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
 
 WHOLE = (
     WholeMethod("hmcs-gestemes", "hmcs.recognition.gestemes", fit_ours),
-    WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian),
-    WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on k-means symbols", fit_symbols),
-    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw),
-    WholeMethod("minirocket", "aeon MiniRocketClassifier on positions", fit_rocket),
+    WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian, prepare),
+    WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on symbols", fit_symbols, prepare),
+    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw, prepare_dtw),
+    WholeMethod("minirocket", "aeon MiniRocketClassifier on positions", fit_rocket, prepare_rocket),
     WholeMethod("svm", "scikit-learn SVC on 12 points and log length", fit_svm),
     WholeMethod("lda", "scikit-learn shrinkage LDA on the same", fit_lda),
     WholeMethod("extra-trees", "scikit-learn ExtraTreesClassifier on windows", fit_trees),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -51,9 +52,18 @@ class Rocket:
         return np.asarray(np.eye(self.gestemes)[int(decided[0])])
 
 
+def prepare_dtw(examples: Examples) -> None:
+    """Have aeon compile its distance for positions of that dimension."""
+    _compile_dtw(examples[0][0].shape[1])
+
+
+def prepare_rocket(examples: Examples) -> None:
+    """Have aeon compile its kernels for positions of that dimension."""
+    _compile_rocket(examples[0][0].shape[1])
+
+
 def fit_dtw(examples: Examples, _rng: np.random.Generator) -> NearestByDtw:
     """Keep the examples."""
-    _compile_dtw(examples[0][0].shape[1])
     return NearestByDtw(tuple(map(_series, flat(examples))), labels(examples))
 
 
@@ -61,7 +71,6 @@ def fit_rocket(examples: Examples, rng: np.random.Generator) -> Rocket:
     """Fit aeon's `MiniRocketClassifier` to the examples, resampled to their mean length."""
     everything = flat(examples)
     samples = max(LEAST_SAMPLES, round(float(np.mean([len(each) for each in everything]))))
-    _compile_rocket(everything[0].shape[1])
     classifier = _rocket_classifier(int(rng.integers(2**31)))
     classifier.fit(np.stack([_resampled(each, samples) for each in everything]), labels(examples))
     return Rocket(classifier, samples, len(examples))
@@ -83,7 +92,10 @@ def _rocket_classifier(seed: int) -> Any:
 @cache
 def _compile_dtw(dimensions: int) -> None:
     series = [np.zeros((dimensions, length)) for length in (9, 10)]
-    peer("aeon.distances").dtw_pairwise_distance(series, [series[0]])
+    with warnings.catch_warnings():
+        # Numba warns of a cast of indices inside aeon.
+        warnings.simplefilter("ignore")
+        peer("aeon.distances").dtw_pairwise_distance(series, [series[0]])
 
 
 @cache

@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
 
 from hmcs_laboratory.methods.features import flat, labels, shape_and_length
-from hmcs_laboratory.methods.whole import Examples
+from hmcs_laboratory.methods.whole import Examples, TooFewError
 from hmcs_laboratory.methods.windows import fit_window_trees, log_shares, windows_of
 
 Array = NDArray[np.float64]
@@ -41,17 +45,16 @@ class OfWindows:
 
 def fit_svm(examples: Examples, _rng: np.random.Generator) -> OfVectors:
     """Fit `SVC` with a radial basis function to standardized vectors."""
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-    from sklearn.svm import SVC
-
     return _fitted(make_pipeline(StandardScaler(), SVC(C=10.0)), examples)
 
 
 def fit_lda(examples: Examples, _rng: np.random.Generator) -> OfVectors:
-    """Fit `LinearDiscriminantAnalysis` with Ledoit–Wolf shrinkage."""
-    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+    """Fit `LinearDiscriminantAnalysis` with Ledoit–Wolf shrinkage.
 
+    Raises TooFewError with one example of each gesteme: nothing varies within a class then.
+    """
+    if all(len(own) == 1 for own in examples):
+        raise TooFewError("one example of each gesteme, expected two of one at least")
     return _fitted(LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto"), examples)
 
 

@@ -17,6 +17,10 @@ Examples = Sequence[Sequence[Array]]
 """Of each of G gestemes performances to learn from: positions, m, shape (T, D)."""
 
 
+class TooFewError(ValueError):
+    """Fewer examples than the method can learn from."""
+
+
 class Fitted(Protocol):
     """A method that has learned."""
 
@@ -36,28 +40,36 @@ class WholeMethod:
     source: str
     """Library and class, or paper."""
     fit: Callable[[Examples, np.random.Generator], Fitted]
-    """Raises UserError where its library is not installed."""
+    """Raises UserError where its library is not installed, and TooFewError."""
+    prepare: Callable[[Examples], None] = lambda _: None
+    """Has what the library imports or compiles on first use done, so that it is not timed."""
 
 
-def timed_fit(
-    method: WholeMethod, examples: Examples, rng: np.random.Generator
-) -> tuple[Fitted, float]:
-    """Return the method fitted, and the processor time it took, s, of the one thread it has."""
-    began_s = time.thread_time()
-    fitted = method.fit(examples, rng)
-    return fitted, time.thread_time() - began_s
+def measured_on(
+    method: WholeMethod,
+    data: GestemeSet,
+    rng: np.random.Generator,
+    seen: Sequence[float] = (1.0,),
+) -> list[dict[str, float]]:
+    """Return `accuracy`, `us_per_sample` and `fit_s` of a method for each share seen.
 
-
-def classified(
-    fitted: Fitted, test: Examples, seen: float = 1.0
-) -> tuple[dict[str, float], NDArray[np.int64]]:
-    """Classify every performance, of each the share `seen` from its start.
-
-    Returns `accuracy` and `us_per_sample`, and how often each gesteme, in rows, was taken for
-    which, in columns, shape (G, G).
+    It learns once, from whole performances, and classifies of each other one that share of its
+    samples, from the start. A method that cannot learn from so few has NaN throughout. Times are
+    processor times of one thread.
     """
-    confusion = np.zeros((len(test), len(test)), dtype=np.int64)
-    samples, spent_s = 0, 0.0
+    method.prepare(data.training)
+    began_s = time.thread_time()
+    try:
+        fitted = method.fit(data.training, rng)
+    except TooFewError:
+        return [dict.fromkeys(("accuracy", "us_per_sample", "fit_s"), np.nan) for _ in seen]
+    fit_s = time.thread_time() - began_s
+    return [{**_classified(fitted, data.test, share), "fit_s": fit_s} for share in seen]
+
+
+def _classified(fitted: Fitted, test: Examples, seen: float) -> dict[str, float]:
+    right = count = samples = 0
+    spent_s = 0.0
     for gesteme, own in enumerate(test):
         for positions in own:
             part = positions[: max(3, int(np.ceil(seen * len(positions))))]
@@ -65,18 +77,6 @@ def classified(
             scores = fitted.classify(part)
             spent_s += time.thread_time() - began_s
             samples += len(part)
-            confusion[gesteme, int(np.argmax(scores))] += 1
-    measures = {
-        "accuracy": float(confusion.trace() / confusion.sum()),
-        "us_per_sample": 1e6 * spent_s / samples,
-    }
-    return measures, confusion
-
-
-def measured_on(
-    method: WholeMethod, data: GestemeSet, rng: np.random.Generator, seen: float = 1.0
-) -> dict[str, float]:
-    """Return `accuracy`, `fit_s` and `us_per_sample` of a method on a set of gestemes."""
-    fitted, fit_s = timed_fit(method, data.training, rng)
-    measures, _ = classified(fitted, data.test, seen)
-    return {**measures, "fit_s": fit_s}
+            count += 1
+            right += int(np.argmax(scores)) == gesteme
+    return {"accuracy": right / count, "us_per_sample": 1e6 * spent_s / samples}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.ensemble import ExtraTreesClassifier
 
 from hmcs_laboratory.methods.features import directions
 
@@ -33,8 +34,6 @@ def windows_of(positions: Array, steps: int = WINDOW_STEPS) -> Array:
 
 def fit_window_trees(windows: Array, classes: NDArray[np.int64], rng: np.random.Generator) -> Any:
     """Return scikit-learn's `ExtraTreesClassifier` fitted to windows and their classes."""
-    from sklearn.ensemble import ExtraTreesClassifier
-
     trees = ExtraTreesClassifier(
         TREES, min_samples_leaf=2, n_jobs=1, random_state=int(rng.integers(2**31))
     )

@@ -11,7 +11,7 @@ from pydantic import Field
 from hmcs_laboratory.data.drawings import left_out
 from hmcs_laboratory.data.hands import Positive, Share
 from hmcs_laboratory.methods.registered import WholeNames, whole
-from hmcs_laboratory.methods.whole import classified, timed_fit
+from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.study import Measured, Study, StudySettings
 
 Drawings = Annotated[int, Field(ge=1, le=6)]
@@ -42,12 +42,9 @@ def _measured(settings: LasaSettings, rng: np.random.Generator) -> Iterator[Meas
     for training in settings.training:
         data = everything.first(gestemes=settings.shapes, training=training)
         for method in whole(settings.methods):
-            fitted, fit_s = timed_fit(method, data.training, rng)
-            for seen in settings.seen:
-                measures, _ = classified(fitted, data.test, seen)
-                yield Measured(
-                    method.name, {"training": training, "seen": seen}, {**measures, "fit_s": fit_s}
-                )
+            measures = measured_on(method, data, rng, settings.seen)
+            for seen, measured in zip(settings.seen, measures, strict=True):
+                yield Measured(method.name, {"training": training, "seen": seen}, measured)
 
 
 LASA = Study(

@@ -9,7 +9,7 @@ import numpy as np
 from hmcs_laboratory.data.gestemes import GestemeSet, performed, random_references
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Share
 from hmcs_laboratory.methods.registered import WholeNames, whole
-from hmcs_laboratory.methods.whole import classified, measured_on, timed_fit
+from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.study import Measured, Scalar, Study
 
 SOURCE = "Aarno 2007, 4.2.1"
@@ -131,14 +131,10 @@ def _partial(
     for count in settings.gestemes:
         part = data.first(gestemes=count)
         for method in whole(settings.methods):
-            fitted, fit_s = timed_fit(method, part.training, rng)
-            for seen in settings.seen:
-                measures, _ = classified(fitted, part.test, seen)
-                yield Measured(
-                    method.name,
-                    {"gestemes": count, "noise": settings.noise, "seen": seen},
-                    {**measures, "fit_s": fit_s},
-                )
+            measures = measured_on(method, part, rng, settings.seen)
+            for seen, measured in zip(settings.seen, measures, strict=True):
+                setting = {"gestemes": count, "noise": settings.noise, "seen": seen}
+                yield Measured(method.name, setting, measured)
 
 
 def _set(
@@ -155,8 +151,9 @@ def _measured(
     settings: _Settings, data: GestemeSet, setting: dict[str, Scalar], rng: np.random.Generator
 ) -> Sequence[Measured]:
     return [
-        Measured(method.name, setting, measured_on(method, data, rng))
+        Measured(method.name, setting, measures)
         for method in whole(settings.methods)
+        for measures in measured_on(method, data, rng)
     ]
 
 
@@ -168,7 +165,13 @@ PEERS = Study(
     f"{SOURCE}; hmmlearn, aeon, scikit-learn",
     PeersSettings,
     noise_trial,
-    tiny={"gestemes": "4", "training": "3", "test": "2", "noise": "0.15"},
+    tiny={
+        "gestemes": "4",
+        "training": "3",
+        "test": "2",
+        "noise": "0.15",
+        "methods": "hmcs-gestemes,svm,lda,extra-trees",
+    },
 )
 NOISE = Study(
     "noise",

