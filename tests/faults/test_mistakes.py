@@ -59,7 +59,7 @@ def of_another_version(path: Path) -> None:
 
 def with_nan(path: Path) -> None:
     def change(name: str, data: bytes) -> bytes:
-        if name != "arrays/means.npy":
+        if name != "arrays/parameters.means.npy":
             return data
         header = len(data) - 8
         return data[:header] + np.array([np.nan]).tobytes()
