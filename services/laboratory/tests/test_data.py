@@ -1,6 +1,6 @@
-"""Data: what stands in a set is what its settings say, and nothing is learned from that is tested."""
+"""Data: a set holds what its settings say, and nothing is learned from that is tested."""
 
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_five_states_come_in_turn_with_one_arc_twice():
     for performance in data.performances:
         assert runs(performance.states) == [0, 1, 2, 3, 4]
         assert len(performance.states) == len(performance.steps)
-    for before, after in zip(FIVE_STATES, FIVE_STATES[1:], strict=False):
+    for before, after in pairwise(FIVE_STATES):
         assert turn_rad(data.references[before], data.references[after]) >= np.pi / 6
 
 

@@ -10,6 +10,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from hmcs.errors import UserError
+from hmcs.motion.steps import Step
 from hmcs.recognition.gestemes import GestemeBank, Scoring
 from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import CurveSettings
@@ -37,8 +38,12 @@ def fitted(name, data):
     return method.fit(data.training, np.random.default_rng(0))
 
 
-def tests_of(data):
+def all_tests(data):
     return [positions for own in data.test for positions in own]
+
+
+def decisions(method, data):
+    return [int(np.argmax(method.classify(each, complete=True))) for each in all_tests(data)]
 
 
 def vectors(performances):
@@ -57,7 +62,9 @@ GESTEMES = np.repeat(np.arange(FEW), 4)
 )
 def test_vector_methods_decide_as_scikit_learn_does(data, name, classifier):
     ours = fitted(name, data)
-    decided = [int(np.argmax(ours.classify(positions))) for positions in tests_of(data)]
+    decided = [
+        int(np.argmax(ours.classify(positions, complete=True))) for positions in all_tests(data)
+    ]
     by_hand = classifier.fit(vectors(data.training), GESTEMES).predict(vectors(data.test))
     assert decided == by_hand.tolist()
 
@@ -69,8 +76,6 @@ def test_our_gestemes_score_as_the_bank_of_the_recognizer_does(data):
     spatial[:, :2] = positions
     scoring = Scoring(background=0.0, temperature=1.0, window_steps=500, prune_nats=np.inf)
     bank = GestemeBank(ours.parameters, scoring, (0, 1), range(FEW))
-    from hmcs.motion.steps import Step
-
     totals = np.zeros(FEW)
     for t, move in enumerate(np.diff(spatial, axis=0)):
         evidence = bank.step(Step(t, spatial[t], move))
@@ -78,33 +83,39 @@ def test_our_gestemes_score_as_the_bank_of_the_recognizer_does(data):
         # Not to have left before is part of what happened.
         stayed = np.log1p(-evidence.exit[first])
         totals[evidence.pair_gesteme[first]] += evidence.log_ratio[first] + stayed
-    np.testing.assert_allclose(ours.classify(positions), totals, rtol=1e-9)
+    np.testing.assert_allclose(ours.classify(positions, complete=False), totals, rtol=1e-9)
+    after = bank.step(Step(len(positions) - 1, spatial[-1], np.array([0.05, 0.0, 0.0])))
+    first = after.pair_start == 0
+    totals[after.pair_gesteme[first]] += np.log(np.maximum(after.exit[first], 1e-300))
+    np.testing.assert_allclose(ours.classify(positions, complete=True), totals, rtol=1e-9)
 
 
 def test_hmmlearn_models_score_as_hmmlearn_does(data):
     pytest.importorskip("hmmlearn")
     gaussian = fitted("hmmlearn-gaussian", data)
     symbols = fitted("hmmlearn-categorical", data)
-    for positions in tests_of(data):
+    for positions in all_tests(data):
         observed = directions(positions)
         np.testing.assert_array_equal(
-            gaussian.classify(positions), [model.score(observed) for model in gaussian.models]
+            gaussian.classify(positions, complete=True),
+            [model.score(observed) for model in gaussian.models],
         )
         seen = symbols.codebook.predict(observed)[:, None]
         np.testing.assert_array_equal(
-            symbols.classify(positions), [model.score(seen) for model in symbols.models]
+            symbols.classify(positions, complete=True),
+            [model.score(seen) for model in symbols.models],
         )
 
 
 def test_the_nearest_neighbor_is_that_of_a_plain_dtw(data):
     pytest.importorskip("aeon")
     ours = fitted("dtw-1nn", data)
-    for positions in tests_of(data)[:2]:
+    for positions in all_tests(data)[:2]:
         expected = [
             -min(plain_dtw(positions - positions[0], own - own[0]) for own in taught)
             for taught in data.training
         ]
-        np.testing.assert_allclose(ours.classify(positions), expected)
+        np.testing.assert_allclose(ours.classify(positions, complete=True), expected)
 
 
 def plain_dtw(a, b):
@@ -128,11 +139,13 @@ def test_minirocket_decides_as_aeons_classifier_does(data):
                 for column in (p - p[0]).T
             ]
         )
-        for p in [p for own in data.training for p in own] + tests_of(data)
+        for p in [p for own in data.training for p in own] + all_tests(data)
     ]
     by_hand = rocket.MiniRocketClassifier(random_state=seed)
     by_hand.fit(np.array(resampled[: len(GESTEMES)]), GESTEMES)
-    decided = [int(np.argmax(ours.classify(positions))) for positions in tests_of(data)]
+    decided = [
+        int(np.argmax(ours.classify(positions, complete=True))) for positions in all_tests(data)
+    ]
     assert decided == by_hand.predict(np.array(resampled[len(GESTEMES) :])).tolist()
 
 

@@ -30,7 +30,7 @@ class GaussianHmms:
 
     models: tuple[Any, ...]
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return the log-likelihood under each model, shape (G,)."""
         observed = directions(positions)
         return np.array([model.score(observed) for model in self.models])
@@ -43,7 +43,7 @@ class SymbolHmms:
     codebook: Any
     models: tuple[Any, ...]
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return the log-likelihood under each model, shape (G,)."""
         symbols = self.codebook.predict(directions(positions))[:, None]
         return np.array([model.score(symbols) for model in self.models])

@@ -17,6 +17,8 @@ from hmcs_laboratory.methods.whole import Examples
 
 Array = NDArray[np.float64]
 
+LEAST_PROBABILITY = 1e-300
+
 
 @dataclass(frozen=True)
 class GestemeModels:
@@ -27,13 +29,16 @@ class GestemeModels:
     transition: Array
     """Shape (G, N, N); rows sum to less than one by the probability that the gesteme is over."""
 
-    def classify(self, positions: Array) -> Array:
-        """Return log P(all steps, and none the last | gesteme), shape (G,)."""
+    def classify(self, positions: Array, *, complete: bool) -> Array:
+        """Return log P(steps | gesteme), and that the last one ends it if complete, shape (G,)."""
         bank = ForwardBank(self.parameters.initial, self.transition)
         moved = positions[1:] - positions[0]
         for observation in np.hstack([moved, directions(positions)]):
             bank.step(self.scores.log_emission(observation))
-        return bank.log_likelihood
+        if not complete:
+            return bank.log_likelihood
+        ended = (bank.states * self.parameters.leave).sum(axis=1)
+        return np.asarray(bank.log_likelihood + np.log(np.maximum(ended, LEAST_PROBABILITY)))
 
 
 def fit_ours(examples: Examples, _rng: np.random.Generator) -> GestemeModels:

@@ -28,7 +28,7 @@ class NearestByDtw:
     """Shape (D, T) each."""
     gestemes: NDArray[np.int64]
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return minus the distance to the nearest example of each gesteme, shape (G,)."""
         distances = peer("aeon.distances").dtw_pairwise_distance(
             list(self.examples), [_series(positions)]
@@ -46,7 +46,7 @@ class Rocket:
     """All series are resampled to so many."""
     gestemes: int
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return one for the gesteme decided for and zero for others, shape (G,)."""
         decided = self.classifier.predict(_resampled(positions, self.samples)[None])
         return np.asarray(np.eye(self.gestemes)[int(decided[0])])

@@ -25,7 +25,7 @@ class OfVectors:
 
     classifier: Any
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return the decision function, or log-probability, of each gesteme, shape (G,)."""
         scores = self.classifier.decision_function(shape_and_length(positions)[None])[0]
         # scikit-learn gives two classes one number.
@@ -38,7 +38,7 @@ class OfWindows:
 
     trees: Any
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return the sum of log-probabilities of each gesteme over the samples, shape (G,)."""
         return np.asarray(log_shares(self.trees, windows_of(positions)).sum(axis=0))
 

@@ -24,10 +24,11 @@ class TooFewError(ValueError):
 class Fitted(Protocol):
     """A method that has learned."""
 
-    def classify(self, positions: Array) -> Array:
+    def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return a score of each gesteme, shape (G,), for positions, m, shape (T, D), T > 2.
 
-        The highest is the most probable one.
+        The highest is the most probable one. `complete` tells whether they are the whole gesteme
+        or its beginning; a method need not make use of it.
         """
         ...
 
@@ -74,7 +75,7 @@ def _classified(fitted: Fitted, test: Examples, seen: float) -> dict[str, float]
         for positions in own:
             part = positions[: max(3, int(np.ceil(seen * len(positions))))]
             began_s = time.thread_time()
-            scores = fitted.classify(part)
+            scores = fitted.classify(part, complete=seen >= 1)
             spent_s += time.thread_time() - began_s
             samples += len(part)
             count += 1
