@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar, get_origin
@@ -95,6 +96,16 @@ class Study(Generic[Settings]):
                 what = f"{name}={given[name]}: {what}"
                 what += f" ({' '.join(about.split())})" if about else ""
             raise UserError(f"study {self.name!r}: {what}") from error
+
+
+def stream_of(method: str, seed: int) -> np.random.Generator:
+    """Return the random stream of a method: the same whatever other methods are measured."""
+    return np.random.default_rng([seed, zlib.crc32(method.encode())])
+
+
+def seed_from(rng: np.random.Generator) -> int:
+    """Return a seed for `stream_of` drawn from a trial's generator."""
+    return int(rng.integers(2**32))
 
 
 def _is_several(settings: type[BaseModel], name: str) -> bool:

@@ -42,5 +42,20 @@ def test_every_setting_is_explained_and_every_study_has_a_source(study):
         assert known.description or name in undocumented, name
 
 
+@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+def test_a_method_measures_the_same_alone_and_among_others(study):
+    def rows(methods):
+        given = {**study.tiny, "methods": methods}
+        settings = study.settings_from([f"{name}={value}" for name, value in given.items()])
+        return [
+            (row.method, row.setting, {k: v for k, v in row.measures.items() if k not in TIMINGS})
+            for row in study.trial(settings, np.random.default_rng(8))
+        ]
+
+    together = rows(study.tiny["methods"])
+    last = study.tiny["methods"].split(",")[-1]
+    np.testing.assert_equal(rows(last), [row for row in together if row[0] == last])
+
+
 def test_names_of_studies_are_unique():
     assert len({study.name for study in STUDIES}) == len(STUDIES)

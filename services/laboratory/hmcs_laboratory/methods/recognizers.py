@@ -1,30 +1,37 @@
-"""The recognizers of `hmcs.recognition`, all that are registered, as online methods."""
+"""The recognizers of `hmcs.recognition` as online methods."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
-from hmcs.recognition.recognizers import kinds, recognizer_of
+from hmcs.recognition.recognizers import kind_named, recognizer_of, settings_of
 from hmcs.task import Task
 from hmcs_laboratory.methods.online import Fresh, OnlineMethod
 
 
-def registered_recognizers() -> tuple[OnlineMethod, ...]:
-    """Return a method `hmcs-KIND` for each registered kind of recognizer."""
-    return tuple(online(kind.name, kind.source) for kind in kinds())
+def recognizer(
+    kind: str,
+    source: str,
+    given: Mapping[str, str] | None = None,
+    *,
+    variant: str = "",
+    marked: bool = False,
+) -> OnlineMethod:
+    """Return the online method `hmcs-KIND`, or `hmcs-KIND-VARIANT`, of a registered kind.
 
-
-def online(recognizer: str, source: str) -> OnlineMethod:
-    """Return a kind of recognizer as an online method, with its default settings."""
+    `given` are settings of the kind that differ from its defaults, as `settings_of` takes them.
+    """
 
     def learned(
         task: Task, demonstrations: Sequence[Demonstration], rng: np.random.Generator
     ) -> Fresh:
-        model = learn(task, demonstrations, recognizer=recognizer, rng=rng)
+        settings = settings_of(kind_named(kind), given or {})
+        model = learn(task, demonstrations, settings, recognizer=kind, rng=rng)
         return lambda: recognizer_of(model)
 
-    return OnlineMethod(f"hmcs-{recognizer}", source, learned)
+    name = "-".join(part for part in ("hmcs", kind, variant) if part)
+    return OnlineMethod(name, source, learned, marked)

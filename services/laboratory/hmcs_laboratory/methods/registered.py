@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator
@@ -12,7 +11,7 @@ from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols, prepa
 from hmcs_laboratory.methods.online import OnlineMethod
 from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm, learn_window_trees
 from hmcs_laboratory.methods.ours import fit_ours
-from hmcs_laboratory.methods.recognizers import registered_recognizers
+from hmcs_laboratory.methods.recognizers import recognizer
 from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
@@ -29,6 +28,9 @@ WHOLE = (
 )
 """Methods that classify a whole gesteme."""
 
+RECOGNIZERS = (recognizer("segment-filter", "hmcs.recognition.segment_filter"),)
+"""Our recognizers that follow a task."""
+
 ONLINE_PEERS = (
     OnlineMethod(
         "extra-trees-window", "scikit-learn ExtraTreesClassifier on windows", learn_window_trees
@@ -37,13 +39,10 @@ ONLINE_PEERS = (
         "concatenated-hmm", "one Gaussian HMM of all states on directions", learn_concatenated_hmm
     ),
 )
-"""Methods that follow a task, beside our recognizers."""
+"""Others that follow a task."""
 
-
-@cache
-def online_methods() -> tuple[OnlineMethod, ...]:
-    """Return the methods that follow a task: all registered recognizers, and the peers."""
-    return (*registered_recognizers(), *ONLINE_PEERS)
+ONLINE = (*RECOGNIZERS, *ONLINE_PEERS)
+"""Methods that follow a task."""
 
 
 Method = TypeVar("Method", WholeMethod, OnlineMethod)
@@ -64,7 +63,7 @@ def _known_whole(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _known_online(names: tuple[str, ...]) -> tuple[str, ...]:
-    return _known(names, online_methods())
+    return _known(names, ONLINE)
 
 
 WholeNames = Annotated[tuple[str, ...], AfterValidator(_known_whole)]
@@ -80,4 +79,4 @@ def whole(names: tuple[str, ...]) -> tuple[WholeMethod, ...]:
 
 def online(names: tuple[str, ...]) -> tuple[OnlineMethod, ...]:
     """Return the methods of those names, or all for none."""
-    return tuple(method for method in online_methods() if not names or method.name in names)
+    return tuple(method for method in ONLINE if not names or method.name in names)

@@ -12,7 +12,7 @@ from hmcs_laboratory.data.drawings import left_out
 from hmcs_laboratory.data.hands import Positive, Share
 from hmcs_laboratory.methods.registered import WholeNames, whole
 from hmcs_laboratory.methods.whole import measured_on
-from hmcs_laboratory.study import Measured, Study, StudySettings
+from hmcs_laboratory.study import Measured, Study, StudySettings, seed_from, stream_of
 
 Drawings = Annotated[int, Field(ge=1, le=6)]
 
@@ -39,10 +39,11 @@ def lasa_trial(settings: LasaSettings, rng: np.random.Generator) -> list[Measure
 
 def _measured(settings: LasaSettings, rng: np.random.Generator) -> Iterator[Measured]:
     everything = left_out(settings.step_m, max(settings.training), rng)
+    seed = seed_from(rng)
     for training in settings.training:
         data = everything.first(gestemes=settings.shapes, training=training)
         for method in whole(settings.methods):
-            measures = measured_on(method, data, rng, settings.seen)
+            measures = measured_on(method, data, stream_of(method.name, seed), settings.seen)
             for seen, measured in zip(settings.seen, measures, strict=True):
                 yield Measured(method.name, {"training": training, "seen": seen}, measured)
 

@@ -10,7 +10,7 @@ from hmcs_laboratory.data.gestemes import GestemeSet, performed, random_referenc
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Share
 from hmcs_laboratory.methods.registered import WholeNames, whole
 from hmcs_laboratory.methods.whole import measured_on
-from hmcs_laboratory.study import Measured, Scalar, Study
+from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
 
 SOURCE = "Aarno 2007, 4.2.1"
 
@@ -67,7 +67,8 @@ class PartialSettings(_Settings):
 
 def noise_trial(settings: NoiseSettings, rng: np.random.Generator) -> list[Measured]:
     """Measure all methods at every noise."""
-    drawing, moving, learning = rng.spawn(3)
+    drawing, moving = rng.spawn(2)
+    seed = seed_from(rng)
     curves = random_references(settings.references, settings.gestemes, drawing)
     return [
         measured
@@ -82,14 +83,14 @@ def noise_trial(settings: NoiseSettings, rng: np.random.Generator) -> list[Measu
                 rng=stream,
             ),
             {"gestemes": settings.gestemes, "noise": noise},
-            learning,
+            seed,
         )
     ]
 
 
 def gesteme_count_trial(settings: GestemeCountSettings, rng: np.random.Generator) -> list[Measured]:
     """Measure all methods on the first so many gestemes of one set."""
-    data, learning = _set(settings, max(settings.gestemes), settings.training, settings.noise, rng)
+    data, seed = _set(settings, max(settings.gestemes), settings.training, settings.noise, rng)
     return [
         measured
         for count in settings.gestemes
@@ -97,7 +98,7 @@ def gesteme_count_trial(settings: GestemeCountSettings, rng: np.random.Generator
             settings,
             data.first(gestemes=count),
             {"gestemes": count, "noise": settings.noise},
-            learning,
+            seed,
         )
     ]
 
@@ -106,7 +107,7 @@ def training_count_trial(
     settings: TrainingCountSettings, rng: np.random.Generator
 ) -> list[Measured]:
     """Measure all methods with the first so many performances of one set to learn from."""
-    data, learning = _set(settings, settings.gestemes, max(settings.training), settings.noise, rng)
+    data, seed = _set(settings, settings.gestemes, max(settings.training), settings.noise, rng)
     return [
         measured
         for count in settings.training
@@ -114,24 +115,22 @@ def training_count_trial(
             settings,
             data.first(training=count),
             {"training": count, "noise": settings.noise},
-            learning,
+            seed,
         )
     ]
 
 
 def partial_trial(settings: PartialSettings, rng: np.random.Generator) -> list[Measured]:
     """Measure all methods, learned from whole performances, on the beginnings of others."""
-    data, learning = _set(settings, max(settings.gestemes), settings.training, settings.noise, rng)
-    return list(_partial(settings, data, learning))
+    data, seed = _set(settings, max(settings.gestemes), settings.training, settings.noise, rng)
+    return list(_partial(settings, data, seed))
 
 
-def _partial(
-    settings: PartialSettings, data: GestemeSet, rng: np.random.Generator
-) -> Iterator[Measured]:
+def _partial(settings: PartialSettings, data: GestemeSet, seed: int) -> Iterator[Measured]:
     for count in settings.gestemes:
         part = data.first(gestemes=count)
         for method in whole(settings.methods):
-            measures = measured_on(method, part, rng, settings.seen)
+            measures = measured_on(method, part, stream_of(method.name, seed), settings.seen)
             for seen, measured in zip(settings.seen, measures, strict=True):
                 setting = {"gestemes": count, "noise": settings.noise, "seen": seen}
                 yield Measured(method.name, setting, measured)
@@ -139,21 +138,21 @@ def _partial(
 
 def _set(
     settings: _Settings, gestemes: int, training: int, noise: float, rng: np.random.Generator
-) -> tuple[GestemeSet, np.random.Generator]:
-    drawing, moving, learning = rng.spawn(3)
+) -> tuple[GestemeSet, int]:
+    drawing, moving = rng.spawn(2)
     curves = random_references(settings.references, gestemes, drawing)
     operator = settings.operator(noise)
     made = performed(curves, operator, training=training, test=settings.test, rng=moving)
-    return made, learning
+    return made, seed_from(rng)
 
 
 def _measured(
-    settings: _Settings, data: GestemeSet, setting: dict[str, Scalar], rng: np.random.Generator
+    settings: _Settings, data: GestemeSet, setting: dict[str, Scalar], seed: int
 ) -> Sequence[Measured]:
     return [
         Measured(method.name, setting, measures)
         for method in whole(settings.methods)
-        for measures in measured_on(method, data, rng)
+        for measures in measured_on(method, data, stream_of(method.name, seed))
     ]
 
 

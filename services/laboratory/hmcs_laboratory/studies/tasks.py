@@ -18,7 +18,7 @@ from hmcs_laboratory.methods.online import (
     state_measures,
 )
 from hmcs_laboratory.methods.registered import OnlineNames, online
-from hmcs_laboratory.study import Measured, Scalar, Study, StudySettings
+from hmcs_laboratory.study import Measured, Scalar, Study, StudySettings, seed_from, stream_of
 
 DRAWINGS = 7
 """Of each LASA shape."""
@@ -63,7 +63,10 @@ def restart_trial(settings: FollowSettings, rng: np.random.Generator) -> list[Me
         measured
         for noise, stream in zip(settings.noise, rng.spawn(len(settings.noise)), strict=True)
         for measured in _states(
-            five_states(settings, noise, stream), settings.methods, {"noise": noise}, stream
+            five_states(settings, noise, stream),
+            settings.methods,
+            {"noise": noise},
+            seed_from(stream),
         )
     ]
 
@@ -73,8 +76,9 @@ def order_trial(settings: FollowSettings, rng: np.random.Generator) -> list[Meas
     rows = []
     for noise, stream in zip(settings.noise, rng.spawn(len(settings.noise)), strict=True):
         trained, unseen = six_segments(settings, noise, stream)
+        seed = seed_from(stream)
         for method in online(settings.methods):
-            able = learned(method, trained, stream)
+            able = learned(method, trained, stream_of(method.name, seed))
             for order, data in (("trained", trained), ("unseen", unseen)):
                 what = followed(able, data.performances)
                 measures = gesteme_measures(what, data)
@@ -90,18 +94,19 @@ def lasa_tasks_trial(settings: LasaTasksSettings, rng: np.random.Generator) -> l
     training, held_out = settings.training, settings.held_out
     fixed = fixed_order(training, held_out, settings.dead_zone_m, rng)
     free = any_order(settings.shapes, training, held_out, settings.dead_zone_m, rng)
+    seed = seed_from(rng)
     return [
-        *_states(fixed, settings.methods, {"order": "fixed", "shapes": 5}, rng),
-        *_states(free, settings.methods, {"order": "any", "shapes": settings.shapes}, rng),
+        *_states(fixed, settings.methods, {"order": "fixed", "shapes": 5}, seed),
+        *_states(free, settings.methods, {"order": "any", "shapes": settings.shapes}, seed),
     ]
 
 
 def _states(
-    data: TaskSet, names: tuple[str, ...], setting: dict[str, Scalar], rng: np.random.Generator
+    data: TaskSet, names: tuple[str, ...], setting: dict[str, Scalar], seed: int
 ) -> list[Measured]:
     rows = []
     for method in online(names):
-        what = followed(learned(method, data, rng), data.performances)
+        what = followed(learned(method, data, stream_of(method.name, seed)), data.performances)
         rows.append(Measured(method.name, setting, state_measures(what, data.performances)))
     return rows
 
