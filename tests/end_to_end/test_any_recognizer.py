@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import ActivateRecognizer, Belief, Done
+from hmcs.bus.messages import Belief
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.recognizers import kinds, recognizer_of
 from hmcs.translation import belief_message
+from hmcs_local.swap import activate, load
 from support.hand import Scene
 from support.lessons import lesson_task, performed, steps_performed
 
@@ -75,28 +76,26 @@ def test_a_running_recognizer_of_another_kind_is_swapped_in(
     scene: Scene, taught: dict[str, tuple[Model, Path]]
 ) -> None:
     stack, steps = scene.stack, steps_performed(52)
-    names = ("segment-filter", sorted(set(taught) - {"segment-filter"})[0])
-    files = [str(taught[name][1]) for name in names]
+    names = ("segment-filter", min(set(taught) - {"segment-filter"}))
+    files = [taught[name][1] for name in names]
     fixture = stack.start(
-        "fixture_controller",
-        "f",
-        *("--models", str(files).replace("'", '"'), "--active-model", names[0]),
+        "fixture_controller", "f", "--models", f'["{files[0]}"]', "--active-model", names[0]
     )
     services = [
         stack.start("recognizer", n, "--model", f) for n, f in zip(names, files, strict=True)
     ]
     stack.until_ready(fixture, *services)
+    model = taught[names[1]][0]
+    assert load(scene.bus, str(files[1])) == f"model {names[1]} {model.hash} is loaded"
     scene.hand.play(steps[:30], 100.0)
     stack.until(lambda: stack.health(fixture).received.get("belief", 0) >= 60)
-    key = scene.bus.keys.rpc("fixture_controller", "f", "activate")
-    (answer,) = scene.bus.ask(key, ActivateRecognizer(model=names[1]), Done)
-    assert answer.body.detail == f"follows {names[1]} {taught[names[1]][0].hash}"
+    assert activate(scene.bus, names[1]) == f"follows {names[1]} {model.hash}"
 
 
 def test_a_model_for_one_process_is_refused_by_classifiers_with_what_to_do(
     scene: Scene, taught: dict[str, tuple[Model, Path]]
 ) -> None:
-    name = sorted(set(taught) - {"segment-filter"})[0]
+    name = min(set(taught) - {"segment-filter"})
     process = scene.stack.start("gesteme_classifier", "c", "--model", taught[name][1])
     assert process.wait(15.0) == 2
     assert "start hmcs_recognizer with it instead" in "\n".join(process.last_lines())

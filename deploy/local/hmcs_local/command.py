@@ -115,6 +115,12 @@ def swap(
     activate: Annotated[
         str, typer.Option(metavar="MODEL", help="The recognizer the fixture is to follow.")
     ] = "",
+    load: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE", help="Its model file, where the fixture controller does not have it."
+        ),
+    ] = "",
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
     folder: _Folder = DEFAULT_FOLDER,
@@ -133,7 +139,7 @@ def swap(
     from hmcs_local.control import Control
     from hmcs_local.observer import open_observer
 
-    if bool(instance) == bool(activate) or (command and not instance):
+    if bool(instance) == bool(activate) or (command and not instance) or (load and instance):
         raise UserError("name either a classifier to replace or a model to --activate")
     with open_observer(router, cell) as bus:
         if instance:
@@ -141,6 +147,8 @@ def swap(
                 bus, Control(folder), instance, command=shlex.split(command), tell=typer.echo
             )
         else:
+            if load:
+                typer.echo(swapping.load(bus, load))
             typer.echo(swapping.activate(bus, activate))
 
 

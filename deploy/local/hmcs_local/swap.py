@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
-from hmcs.bus.messages import ActivateRecognizer, Done
+from hmcs.bus.messages import ActivateRecognizer, Done, LoadModel, Message
 from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.errors import UserError
 from hmcs_local.control import Control
@@ -30,6 +30,18 @@ def activate(bus: Bus, model: str) -> str:
         check_name("model", model)
     except KeyNameError as error:
         raise SwapError(str(error)) from None
+    return _asked_of_fixtures(bus, "activate", ActivateRecognizer(model=model))
+
+
+def load(bus: Bus, path: str) -> str:
+    """Let the fixture learn a model file's guides; returns what the fixture answers.
+
+    The path is the fixture controller's own. Raises SwapError as `activate` does.
+    """
+    return _asked_of_fixtures(bus, "load_model", LoadModel(path=path))
+
+
+def _asked_of_fixtures(bus: Bus, verb: str, question: Message) -> str:
     keys = bus.keys
     present = [keys.member_of(key) for key in bus.alive(keys.presence("fixture_controller"))]
     if not present:
@@ -38,9 +50,9 @@ def activate(bus: Bus, model: str) -> str:
         )
     details = []
     for member in present:
-        key = keys.rpc(member.service, member.instance, "activate")
+        key = keys.rpc(member.service, member.instance, verb)
         try:
-            answers = bus.ask(key, ActivateRecognizer(model=model), Done)
+            answers = bus.ask(key, question, Done)
         except RequestRefusedError as error:
             raise SwapError(f"{member.instance}: {error}") from None
         if not answers:
