@@ -1,0 +1,112 @@
+"""Gesteme HMMs in parallel, from steps to probabilities of gestemes (thesis 4.1.1).
+
+Shapes: M gestemes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from hmcs.motion.steps import Step
+from hmcs.recognition.model import axes_of
+from hmcs.recognition.recognizers import Lesson
+from hmcs.recognition.recognizers.gesteme_hmms import (
+    GestemeHmms,
+    GestemeHmmSettings,
+    GestemeScores,
+    Normals,
+    check_gesteme_hmms,
+    learn_gesteme_hmms,
+)
+from hmcs.recognition.recognizers.observing import (
+    ObservationSettings,
+    Observed,
+    Observer,
+    Observing,
+    learn_observing,
+    observations,
+)
+from hmcs.recognition.recognizers.restarting import (
+    Classification,
+    CusumSettings,
+    Restart,
+    gesteme_level,
+)
+from hmcs.task import Task
+
+
+class Gestemes(NamedTuple):
+    """What is known of the gestemes of a task."""
+
+    observing: Observing
+    hmms: GestemeHmms
+
+
+def learn_gestemes(
+    lesson: Lesson,
+    observed: Observed,
+    observation_settings: ObservationSettings,
+    hmm_settings: GestemeHmmSettings,
+) -> Gestemes:
+    """Return what labeled segments tell of the gestemes."""
+    axes = axes_of(lesson.task)
+    observing = learn_observing(
+        [segment.steps for segment in lesson.segments],
+        axes,
+        observed,
+        observation_settings,
+        lesson.rng,
+    )
+    by_gesteme = [
+        [observations(s.steps, observing, axes) for s in lesson.segments if s.gesteme == g]
+        for g in range(len(lesson.task.gestemes))
+    ]
+    lesson.progress(f"gesteme HMMs on {observed} observations")
+    return Gestemes(observing, learn_gesteme_hmms(by_gesteme, observing.symbols, hmm_settings))
+
+
+def check_gestemes(gestemes: Gestemes, task: Task) -> None:
+    """Raise ValueError where the arrays do not fit together, or not the task."""
+    check_gesteme_hmms(gestemes.hmms, len(task.gestemes))
+    observing, emissions = gestemes.observing, gestemes.hmms.emissions
+    if observing.window_steps < 1 or observing.hop_steps < 1 or observing.bins < 0:
+        raise ValueError("windows of no length, or bins below 0")
+    axes = len(axes_of(task))
+    dimensions = axes * observing.window_steps
+    features = {observing.codebook.shape[1:], observing.lower.shape, observing.upper.shape}
+    if features != {(dimensions,)}:
+        raise ValueError(f"observations of shapes {features}, expected ({dimensions},)")
+    expected: tuple[int, ...] = (dimensions,)
+    if not isinstance(emissions, Normals):
+        expected = (1 if len(observing.codebook) else dimensions, observing.symbols or 0)
+    emitted = emissions[0].shape[2:]
+    if emitted != expected:
+        raise ValueError(f"gesteme HMMs emit {emitted}, but {expected} is observed")
+
+
+class GestemeClassifier:
+    """Says after each step which gesteme is performed."""
+
+    def __init__(
+        self,
+        gestemes: Gestemes,
+        axes: Sequence[int],
+        restart: Restart,
+        cusum: CusumSettings,
+    ) -> None:
+        self._observer = Observer(gestemes.observing, axes)
+        self._scores = GestemeScores(gestemes.hmms)
+        self._level = gesteme_level(gestemes.hmms.chains, restart, cusum)
+        self._heeds_marks = restart == "given"
+        # The first step is always observed.
+        self._latest: Classification
+
+    def step(self, step: Step) -> Classification:
+        """Take the next step; between windows the classification stays as it was."""
+        mark = step.mark and self._heeds_marks
+        observation = self._observer.step(step, afresh=mark)
+        if observation is not None:
+            log_emission = self._scores.log_emission(observation)
+            self._latest = self._level.step(step.index, log_emission, mark=mark)
+        return self._latest
