@@ -1,10 +1,11 @@
-"""The laboratory's command line; `hmcs study` passes through to `run_study`."""
+"""The laboratory's command line; `hmcs study` and `hmcs figures` pass through to it."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 
@@ -75,14 +76,50 @@ def run_study(
     return 0
 
 
+def run_figures(
+    folder: Path,
+    *,
+    numbers: Sequence[str] = (),
+    fast: bool = False,
+    seed: int = 1,
+    workers: int | None = None,
+) -> int:
+    """Make the figures of the thesis, or those of these numbers; return the exit code.
+
+    Says on standard output where their page is. Progress goes to standard error where it is a
+    terminal. Ctrl-C ends with 130. Raises UserError as `make_figures` does.
+    """
+    # Drawing takes a second to import, and studies do not need it.
+    from hmcs_laboratory.figures.progress import figures_shown
+    from hmcs_laboratory.figures.run import PAGE, make_figures
+
+    console = Console(stderr=True)
+    try:
+        with figures_shown(console) as told:
+            made = make_figures(
+                folder, numbers=numbers, fast=fast, seed=seed, workers=workers, progress=told
+            )
+    except KeyboardInterrupt:
+        console.print("figures: interrupted")
+        return INTERRUPTED
+    print(f"{folder / PAGE}: {len(made)} figures, seed {seed}")
+    return 0
+
+
+def numbers_of(only: str) -> list[str]:
+    """Return the numbers of figures in a text with commas between them."""
+    return [number.strip() for number in only.split(",") if number.strip()]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run with these arguments; return the exit code, 2 for a mistake of the user."""
     parser = argparse.ArgumentParser(prog="hmcs_laboratory", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     _add_study(commands.add_parser("study", help="measure methods of recognition"))
+    _add_figures(commands.add_parser("figures", help="make the figures of the thesis anew"))
     given = parser.parse_args(argv)
     try:
-        return _study(given, parser)
+        return _figures(given) if given.command == "figures" else _study(given, parser)
     except UserError as error:
         print(f"hmcs_laboratory: {error}", file=sys.stderr)
         return USER_MISTAKE
@@ -126,4 +163,32 @@ def _study(given: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
         assignments=given.assignments,
         as_json_line=given.json,
         cluster=given.cluster,
+    )
+
+
+def _add_figures(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--fast", action="store_true", help="fewer trials and settings")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("out/figures"),
+        metavar="DIR",
+        help="out/figures if none",
+    )
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes; one a processor by default"
+    )
+    parser.add_argument(
+        "--only", default="", metavar="NUMBERS", help="these alone, e.g. 2.6,4.12; all if none"
+    )
+
+
+def _figures(given: argparse.Namespace) -> int:
+    return run_figures(
+        given.output,
+        numbers=numbers_of(given.only),
+        fast=given.fast,
+        seed=given.seed,
+        workers=given.workers,
     )

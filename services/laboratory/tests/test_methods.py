@@ -19,7 +19,7 @@ from hmcs_laboratory.methods.features import directions, shape_and_length
 from hmcs_laboratory.methods.online import followed, learned
 from hmcs_laboratory.methods.registered import ONLINE_PEERS, WHOLE
 from hmcs_laboratory.methods.whole import measured_on
-from hmcs_laboratory.methods.windows import windows_of
+from hmcs_laboratory.methods.windows import Window
 
 SETTINGS = CurveSettings()
 FEW = 4
@@ -151,13 +151,18 @@ def test_minirocket_decides_as_aeons_classifier_does(data):
 
 def test_windows_see_the_past_only_and_stand_still_before_the_start():
     positions = np.cumsum(np.random.default_rng(0).standard_normal((9, 2)), axis=0)
-    windows = windows_of(positions, 3)
-    assert windows.shape == (8, 8)
-    np.testing.assert_array_equal(windows_of(positions[:5], 3), windows[:4])
-    np.testing.assert_allclose(windows[5, :2], positions[6] - positions[3])
-    np.testing.assert_allclose(windows[5, 2:4], directions(positions)[5])
-    np.testing.assert_allclose(windows[5, 6:8], directions(positions)[3])
-    np.testing.assert_array_equal(windows[0, 4:], 0)
+    origin = np.array([1.0, -1.0])
+    for window, places in ((Window(3, from_start=True), 1), (Window(3, from_start=False), 3)):
+        seen = window.features(positions, origin)
+        assert seen.shape == (8, 2 * places + 6)
+        np.testing.assert_array_equal(window.features(positions[:5], origin), seen[:4])
+        moves = seen[:, 2 * places :]
+        np.testing.assert_allclose(moves[5, :2], directions(positions)[5])
+        np.testing.assert_allclose(moves[5, 4:], directions(positions)[3])
+        np.testing.assert_array_equal(moves[0, 2:], 0)
+    np.testing.assert_allclose(seen[5, 4:6], positions[6] - positions[3])
+    from_start = Window(3, from_start=True).features(positions, origin)
+    np.testing.assert_allclose(from_start[:, :2], positions[1:] - origin)
 
 
 @pytest.mark.parametrize("name", ["hmcs-gestemes", "svm", "lda", "extra-trees"])

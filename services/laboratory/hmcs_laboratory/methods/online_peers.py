@@ -24,7 +24,7 @@ from hmcs.task import Task
 from hmcs_laboratory.data.tasks import as_performance
 from hmcs_laboratory.methods.features import directions
 from hmcs_laboratory.methods.online import Fresh
-from hmcs_laboratory.methods.windows import WINDOW_STEPS, fit_window_trees, windows_of
+from hmcs_laboratory.methods.windows import FROM_START, LONG, Window, fit_window_trees
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,9 @@ ANY_STATE = 1e-3
 class WindowTrees:
     """Classifies each step by the window of steps that ends with it."""
 
-    def __init__(self, trees: Any, task: Task) -> None:
+    def __init__(self, trees: Any, window: Window, task: Task) -> None:
         self._trees = trees
+        self._window = window
         self._task = task
         self._axes = list(axes_of(task))
         self._points: list[Array] = []
@@ -47,10 +48,11 @@ class WindowTrees:
         """Take the next step."""
         if not self._points:
             self._points.append(step.position[self._axes])
+            self._origin = self._points[0]
         self._points.append((step.position + step.displacement)[self._axes])
-        # One point more than the window: the directions in it need where its first step began.
-        self._points = self._points[-WINDOW_STEPS - 1 :]
-        window = windows_of(np.array(self._points))[-1:]
+        # One point more than steps: where the first of them began.
+        self._points = self._points[-self._window.steps - 1 :]
+        window = self._window.features(np.array(self._points), self._origin)[-1:]
         states = np.zeros(len(self._task.states))
         states[self._trees.classes_] = self._trees.predict_proba(window)[0]
         return recognition(step.index, states, self._task)
@@ -74,17 +76,34 @@ class ConcatenatedHmm:
         return recognition(step.index, states, self._task, float(increment[0]))
 
 
-def learn_window_trees(
+def learn_long_window_trees(
     task: Task, demonstrations: Sequence[Demonstration], rng: np.random.Generator
 ) -> Fresh:
-    """Fit extremely randomised trees to the windows of all demonstrated steps."""
+    """Fit extremely randomised trees to long windows of all demonstrated steps."""
+    return _learned_trees(task, demonstrations, LONG, rng)
+
+
+def learn_start_trees(
+    task: Task, demonstrations: Sequence[Demonstration], rng: np.random.Generator
+) -> Fresh:
+    """Fit them to short windows, and where the hand is seen from the start of the task."""
+    return _learned_trees(task, demonstrations, FROM_START, rng)
+
+
+def _learned_trees(
+    task: Task,
+    demonstrations: Sequence[Demonstration],
+    window: Window,
+    rng: np.random.Generator,
+) -> Fresh:
     axes = list(axes_of(task))
     made = [as_performance(demonstration, task) for demonstration in demonstrations]
-    windows = np.concatenate([windows_of(_path(each.steps)[:, axes]) for each in made])
+    paths = [_path(each.steps)[:, axes] for each in made]
+    windows = np.concatenate([window.features(path, path[0]) for path in paths])
     states = np.concatenate([each.states for each in made])
     labeled = states != NONE
     trees = fit_window_trees(windows[labeled], states[labeled], rng)
-    return lambda: WindowTrees(trees, task)
+    return lambda: WindowTrees(trees, window, task)
 
 
 def learn_concatenated_hmm(

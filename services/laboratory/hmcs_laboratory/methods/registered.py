@@ -9,7 +9,11 @@ from pydantic import AfterValidator
 from hmcs.task.model import unknown
 from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols, prepare
 from hmcs_laboratory.methods.online import OnlineMethod
-from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm, learn_window_trees
+from hmcs_laboratory.methods.online_peers import (
+    learn_concatenated_hmm,
+    learn_long_window_trees,
+    learn_start_trees,
+)
 from hmcs_laboratory.methods.ours import fit_ours
 from hmcs_laboratory.methods.recognizers import recognizer
 from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
@@ -33,7 +37,14 @@ RECOGNIZERS = (recognizer("segment-filter", "hmcs.recognition.segment_filter"),)
 
 ONLINE_PEERS = (
     OnlineMethod(
-        "extra-trees-window", "scikit-learn ExtraTreesClassifier on windows", learn_window_trees
+        "extra-trees-window",
+        "scikit-learn ExtraTreesClassifier on the last 60 steps",
+        learn_long_window_trees,
+    ),
+    OnlineMethod(
+        "extra-trees-start",
+        "scikit-learn ExtraTreesClassifier on the last 15 steps and the place since the start",
+        learn_start_trees,
     ),
     OnlineMethod(
         "concatenated-hmm", "one Gaussian HMM of all states on directions", learn_concatenated_hmm

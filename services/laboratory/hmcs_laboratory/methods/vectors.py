@@ -14,7 +14,7 @@ from sklearn.svm import SVC
 
 from hmcs_laboratory.methods.features import flat, labels, shape_and_length
 from hmcs_laboratory.methods.whole import Examples, TooFewError
-from hmcs_laboratory.methods.windows import fit_window_trees, log_shares, windows_of
+from hmcs_laboratory.methods.windows import FROM_START, fit_window_trees, log_shares
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class OfWindows:
 
     def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return the sum of log-probabilities of each gesteme over the samples, shape (G,)."""
-        return np.asarray(log_shares(self.trees, windows_of(positions)).sum(axis=0))
+        return np.asarray(log_shares(self.trees, _windows(positions)).sum(axis=0))
 
 
 def fit_svm(examples: Examples, _rng: np.random.Generator) -> OfVectors:
@@ -60,9 +60,13 @@ def fit_lda(examples: Examples, _rng: np.random.Generator) -> OfVectors:
 
 def fit_trees(examples: Examples, rng: np.random.Generator) -> OfWindows:
     """Fit extremely randomised trees to the windows of all examples."""
-    everything = [windows_of(positions) for positions in flat(examples)]
+    everything = [_windows(positions) for positions in flat(examples)]
     gestemes = np.repeat(labels(examples), [len(windows) for windows in everything])
     return OfWindows(fit_window_trees(np.concatenate(everything), gestemes, rng))
+
+
+def _windows(positions: Array) -> Array:
+    return FROM_START.features(positions, positions[0])
 
 
 def _fitted(classifier: Any, examples: Examples) -> OfVectors:

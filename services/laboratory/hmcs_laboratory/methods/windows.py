@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,31 +12,45 @@ from hmcs_laboratory.methods.features import directions
 
 Array = NDArray[np.float64]
 
-WINDOW_STEPS = 15
 TREES = 100
 LEAST_SHARE = 1e-3
 """A share of trees below this counts as this: no window alone rules a class out."""
 
 
-def windows_of(positions: Array, steps: int = WINDOW_STEPS) -> Array:
-    """Return what is seen of the last steps after each step, shape (T − 1, (steps + 1) · D).
+class Window(NamedTuple):
+    """What is seen of a motion after each step."""
 
-    For positions of shape (T, D): the displacement from the window's start, and the directions
-    of its steps, newest first. Before the start the hand has stood still.
-    """
-    count, dimensions = len(positions) - 1, positions.shape[1]
-    newest = np.arange(1, count + 1)
-    moved = positions[1:] - positions[np.maximum(newest - steps, 0)]
-    padded = np.concatenate([np.zeros((steps, dimensions)), directions(positions)])
-    seen = [padded[steps + newest - 1 - back] for back in range(steps)]
-    return np.hstack([moved, *seen])
+    steps: int
+    """How many of the last steps."""
+    from_start: bool
+    """Where the hand is: seen from where the motion began, or from the steps of the window."""
+
+    def features(self, positions: Array, origin: Array) -> Array:
+        """Return what is seen after each step between positions of shape (T, D), (T − 1, F).
+
+        Where the hand is, from `origin`, (D,), or from where each of the last steps ended or
+        the first position, newest first; and the directions of the last steps, newest first.
+        Before the first position the hand has stood still.
+        """
+        dimensions = positions.shape[1]
+        newest = np.arange(1, len(positions))
+        padded = np.concatenate([np.zeros((self.steps, dimensions)), directions(positions)])
+        moves = [padded[self.steps + newest - 1 - back] for back in range(self.steps)]
+        here = positions[1:]
+        if self.from_start:
+            return np.hstack([here - origin, *moves])
+        since = range(1, self.steps + 1)
+        return np.hstack([*(here - positions[np.maximum(newest - b, 0)] for b in since), *moves])
+
+
+FROM_START = Window(15, from_start=True)
+LONG = Window(60, from_start=False)
+"""Longer than most gestemes: which one came before is seen."""
 
 
 def fit_window_trees(windows: Array, classes: NDArray[np.int64], rng: np.random.Generator) -> Any:
     """Return scikit-learn's `ExtraTreesClassifier` fitted to windows and their classes."""
-    trees = ExtraTreesClassifier(
-        TREES, min_samples_leaf=2, n_jobs=1, random_state=int(rng.integers(2**31))
-    )
+    trees = ExtraTreesClassifier(TREES, n_jobs=1, random_state=int(rng.integers(2**31)))
     return trees.fit(windows, classes)
 
 
