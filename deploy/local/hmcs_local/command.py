@@ -272,6 +272,28 @@ def study(
     )
 
 
+@app.command()
+def figures(
+    fast: Annotated[bool, typer.Option("--fast", help="With fewer trials and settings.")] = False,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="The folder pictures and page are written to.")
+    ] = Path("out/figures"),
+    seed: Annotated[int, typer.Option(help="Equal seeds make the same figures.")] = 1,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Processes; one a processor by default.")
+    ] = None,
+    only: Annotated[
+        str, typer.Option(metavar="NUMBERS", help="These alone, e.g. 2.6,4.12; all if none.")
+    ] = "",
+) -> None:
+    """Make the figures of the thesis anew, with a page that tells what came out of each."""
+    from hmcs_laboratory.command import numbers_of, run_figures
+
+    raise typer.Exit(
+        run_figures(output, numbers=numbers_of(only), fast=fast, seed=seed, workers=workers)
+    )
+
+
 @task_app.command()
 def check(
     file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],

@@ -173,14 +173,14 @@ def _add_figures(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("out/figures"),
         metavar="DIR",
-        help="out/figures if none",
+        help="default: out/figures",
     )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--workers", type=int, metavar="N", help="processes; one a processor by default"
     )
     parser.add_argument(
-        "--only", default="", metavar="NUMBERS", help="these alone, e.g. 2.6,4.12; all if none"
+        "--only", default="", metavar="NUMBERS", help="these alone, e.g. 2.6,4.12; default: all"
     )
 
 

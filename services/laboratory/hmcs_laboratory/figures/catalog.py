@@ -7,6 +7,12 @@ from typing import Any
 
 from hmcs.errors import UserError
 from hmcs.task.model import unknown
+from hmcs_laboratory.figures.clusters import (
+    CentersSettings,
+    ElbowSettings,
+    cluster_centers,
+    elbow_criterion,
+)
 from hmcs_laboratory.figures.figure import Figure
 from hmcs_laboratory.figures.trajectories import (
     TaskFigureSettings,
@@ -15,7 +21,46 @@ from hmcs_laboratory.figures.trajectories import (
     typical_trajectories,
 )
 
+_FAST_ELBOW = {"repeats": 3}
+
 FIGURES: tuple[Figure[Any], ...] = (
+    Figure(
+        "2.5",
+        "Cluster centers of motion directions",
+        "Centers that k-means finds among direction vectors on the unit circle, for 2, 3, 4 and 5 "
+        "clusters; the vectors come from five nominal directions.",
+        cluster_centers,
+        CentersSettings(),
+    ),
+    Figure(
+        "2.6",
+        "The elbow criterion: 5 clusters",
+        "The normalized error e(k), its slope and the test statistic g(k) of a CUSUM-RLS test "
+        "that runs backward, with its alarm line: e(k) bends at 5, and the elbow found is 5.",
+        elbow_criterion,
+        ElbowSettings(),
+        _FAST_ELBOW,
+        data_of="2.5",
+    ),
+    Figure(
+        "2.7",
+        "The elbow criterion: 10 clusters",
+        "The same for ten directions. There are two elbows, a weaker one at 5, where each center "
+        "holds two directions, and one at 10; the test finds 10.",
+        elbow_criterion,
+        ElbowSettings(nominal=10),
+        _FAST_ELBOW,
+    ),
+    Figure(
+        "2.8",
+        "The elbow criterion fails: 10 clusters, 8 searched",
+        "The data of figure 2.7, but only up to 8 clusters are considered: the wrong elbow, at 5, "
+        "is selected.",
+        elbow_criterion,
+        ElbowSettings(nominal=10, most=8),
+        _FAST_ELBOW,
+        data_of="2.7",
+    ),
     Figure(
         "4.2",
         "Typical simulated operator trajectories",

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Picture
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ UNKNOWN_COLOR = "#8C8C8C"
 INK = "#222222"
 FAINT = "#888888"
 GRID_COLOR = "#e6e6e6"
-CHANGE_COLOR = "#CC3311"
+CHANGE_COLOR = WRONG_COLOR = "#CC3311"
 WIDTH_IN = 10.0
 """Of every figure."""
 
@@ -52,7 +53,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
 }
 
-Number = float | int | str | bool | None | Sequence[float | int | str]
+Number = float | int | str | bool | None | Sequence[float | int | str | None]
 
 
 class Drawn(NamedTuple):
@@ -136,8 +137,7 @@ def label_space(ax: Axes, dimensions: int, unit: str = "m") -> None:
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.pane.set_facecolor("white")
             axis.pane.set_edgecolor(GRID_COLOR)
-        for axis in ("x", "y", "z"):
-            ax.locator_params(axis=axis, nbins=4)
+            axis.set_major_locator(MaxNLocator(4))
 
 
 def listed(names: Sequence[str]) -> str:

@@ -48,7 +48,7 @@ def make_figures(
     fast: bool = False,
     seed: int = 1,
     workers: int | None = None,
-    progress: Progress = lambda number, done, total: None,
+    progress: Progress = lambda *_: None,
 ) -> tuple[Made, ...]:
     """Make the figures of those numbers, all for none, and write them and their page to a folder.
 

@@ -18,6 +18,7 @@ from hmcs_laboratory.figures.drawing import (
     FAINT,
     INK,
     Drawn,
+    Number,
     color_of,
     draw_path,
     label_space,
@@ -141,8 +142,8 @@ def five_state_task(settings: TaskFigureSettings, rng: np.random.Generator) -> D
     label_space(ax, 2)
     picture.legend(loc="outside right center")
     lengths = _lengths(states)
-    numbers = {
-        "states": len(set(FIVE_STATES[s] + str(s) for s in states.tolist())),
+    numbers: dict[str, Number] = {
+        "states": len(set(states.tolist())),
         "gestemes": len({FIVE_STATES[s] for s in states.tolist()}),
         "steps": len(states),
         "steps_of_state": lengths,
