@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 PHASES = 5
 VARIANCE_FLOOR = 0.01
-ANY_STATE = 1e-3
+ANY_STATE = 1e-6
 """Probability that a state is followed by any other than the task names."""
 
 
