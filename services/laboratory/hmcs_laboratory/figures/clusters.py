@@ -95,6 +95,8 @@ def cluster_centers(settings: CentersSettings, rng: np.random.Generator) -> Draw
             ax.plot(*center, color=color, ls="", marker=mark, ms=11, mec=INK, mew=1.2)
         ax.set_title(f"{k} clusters: mean distance to the center {distances[-1]:.3f}")
         ax.set_aspect("equal")
+        ax.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+        ax.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     for ax in grid[-1]:
         ax.set_xlabel("x of the direction (unit vector)")
     for ax in grid[:, 0]:
