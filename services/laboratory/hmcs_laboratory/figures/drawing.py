@@ -129,11 +129,15 @@ def label_space(ax: Axes, dimensions: int, unit: str = "m") -> None:
     pad = 4.0 if dimensions == 2 else 9.0
     ax.set_xlabel(f"x, {unit}", labelpad=pad)
     ax.set_ylabel(f"y, {unit}", labelpad=pad)
-    ax.set_aspect("equal", adjustable="datalim" if dimensions == 2 else "box")
-    if dimensions == 3:
+    if dimensions == 2:
+        ax.set_aspect("equal", adjustable="datalim")
+    else:
         # Only axes in space have a third one.
         space: Any = ax
         space.set_zlabel(f"z, {unit}")
+        sides = np.ptp([space.get_xlim(), space.get_ylim(), space.get_zlim()], axis=1)
+        # A little smaller than its place, which has no room for the labels.
+        space.set_box_aspect(sides, zoom=0.85)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.pane.set_facecolor("white")
             axis.pane.set_edgecolor(GRID_COLOR)

@@ -225,8 +225,8 @@ def _found(
     return (
         f"The winning gesteme HMM was right in {100 * (~wrong).mean():.0f} % of {len(truth)} "
         f"steps. The layered HMM, restarted at the true changes, had {_percent(layered[0])} of "
-        f"{what} right and saw the changes {_delays(layered[0])} late. The two most probable differed by "
-        f"{_margin(followed.states):.2f} on average for its states, by "
+        f"{what} right and saw the changes {_delays(layered[0])} late. The two most probable "
+        f"differed by {_margin(followed.states):.2f} on average for its states, by "
         f"{followed.margin_of_gestemes:.2f} for the gesteme HMMs. {fall}The segment filter, told "
         f"nothing, had {_percent(unmarked[0])} right and saw the changes {_delays(unmarked[0])} "
         f"late. Over all {len(layered)} performances: layered HMM {_pooled(layered)}; segment "
@@ -344,8 +344,9 @@ def _panels(
     raw.set_ylabel("log likelihood, nats")
     normalized.set_title("The same, normalized")
     for gesteme in range(len(names.gestemes)):
-        own = np.where(truth == gesteme, float(gesteme), np.nan)
-        gestemes.plot(at, own, color="#bbbbbb", linewidth=9, solid_capstyle="projecting")
+        own = at[truth == gesteme]
+        left, right = own - 0.5, own + 0.5
+        gestemes.hlines(np.full(len(own), gesteme), left, right, color="#bbbbbb", linewidth=9)
     gestemes.plot(at, followed.winners, color=INK, linestyle="", marker="o", ms=4)
     gestemes.set_yticks(range(len(names.gestemes)), names.gestemes)
     gestemes.set_ylim(-0.6, len(names.gestemes) - 0.4)
