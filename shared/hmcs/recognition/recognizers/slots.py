@@ -60,8 +60,14 @@ def learn_slot_chain(chain: TaskChain, segments: Sequence[Segment], any_state: f
 
 def slots_of(chain: TaskChain, segments: Sequence[Segment]) -> Integers:
     """Return the slot that each segment was performed in."""
-    pairs = list(zip(chain.slot_state.tolist(), chain.slot_gesteme.tolist(), strict=True))
-    return np.array([pairs.index((each.state, each.gesteme)) for each in segments], dtype=np.int64)
+    index = slot_index(chain)
+    return np.array([index[each.state, each.gesteme] for each in segments], dtype=np.int64)
+
+
+def slot_index(chain: TaskChain) -> dict[tuple[int, int], int]:
+    """Return the slot of each state with one of its gestemes."""
+    pairs = zip(chain.slot_state.tolist(), chain.slot_gesteme.tolist(), strict=True)
+    return {pair: slot for slot, pair in enumerate(pairs)}
 
 
 def slot_rows(chain: TaskChain, segments: Sequence[Segment], rows: Sequence[Array]) -> list[Array]:
