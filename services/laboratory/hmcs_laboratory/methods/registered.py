@@ -17,17 +17,21 @@ from hmcs_laboratory.methods.online_peers import (
 from hmcs_laboratory.methods.ours import fit_ours
 from hmcs_laboratory.methods.recognizers import recognizer
 from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
+from hmcs_laboratory.methods.symbol_hmms import SYMBOL_METHODS
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
 
 WHOLE = (
     WholeMethod("hmcs-gestemes", "hmcs.recognition.gestemes", fit_ours),
+    *SYMBOL_METHODS,
     WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian, prepare),
     WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on symbols", fit_symbols, prepare),
-    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw, prepare_dtw),
-    WholeMethod("minirocket", "aeon MiniRocketClassifier on positions", fit_rocket, prepare_rocket),
-    WholeMethod("svm", "scikit-learn SVC on 12 points and log length", fit_svm),
-    WholeMethod("lda", "scikit-learn shrinkage LDA on the same", fit_lda),
+    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw, prepare_dtw, True),
+    WholeMethod(
+        "minirocket", "aeon MiniRocketClassifier on positions", fit_rocket, prepare_rocket, True
+    ),
+    WholeMethod("svm", "scikit-learn SVC on 12 points and log length", fit_svm, whole_only=True),
+    WholeMethod("lda", "scikit-learn shrinkage LDA on the same", fit_lda, whole_only=True),
     WholeMethod("extra-trees", "scikit-learn ExtraTreesClassifier on windows", fit_trees),
 )
 """Methods that classify a whole gesteme."""

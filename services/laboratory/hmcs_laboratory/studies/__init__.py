@@ -12,6 +12,7 @@ from hmcs_laboratory.studies.gestemes import (
     PEERS,
     TRAINING_COUNT,
 )
+from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
 from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
 from hmcs_laboratory.study import Study
 
@@ -20,6 +21,7 @@ STUDIES: tuple[Study[Any], ...] = (
     NOISE,
     GESTEME_COUNT,
     TRAINING_COUNT,
+    SYMBOL_COUNT,
     PARTIAL,
     RESTART,
     ORDER,
