@@ -175,6 +175,18 @@ def test_easy_gestemes_are_recognized_and_equal_streams_give_equal_results(name)
     assert first["accuracy"] == second["accuracy"] == 1.0
 
 
+def test_a_beginning_is_compared_with_beginnings_by_what_compares_whole_motions():
+    rng = np.random.default_rng(4)
+    curves = random_references(CurveSettings(kind="circle").references, 3, rng)
+    easy = performed(curves, SETTINGS.operator(0.02), training=3, test=2, rng=rng)
+    for name in ("hmcs-gestemes", "svm", "lda"):
+        (method,) = (method for method in WHOLE if method.name == name)
+        rng = np.random.default_rng(1)
+        part, whole = measured_on(method, easy, rng, (0.5, 1.0))
+        assert part["accuracy"] == whole["accuracy"] == 1.0
+        assert (part["fit_s"] == whole["fit_s"]) == (not method.whole_only)
+
+
 @pytest.mark.parametrize("method", ONLINE_PEERS, ids=lambda method: method.name)
 def test_online_peers_give_probabilities_and_look_at_nothing_to_come(method):
     settings = TaskSettings(demonstrations=3, performances=1)

@@ -44,6 +44,9 @@ class WholeMethod:
     """Raises UserError where its library is not installed, and TooFewError."""
     prepare: Callable[[Examples], None] = lambda _: None
     """Has what the library imports or compiles on first use done, so that it is not timed."""
+    whole_only: bool = False
+    """Whether it compares whole motions only. To classify beginnings it learns from beginnings of
+    the same share: it is told how much it sees, others are not."""
 
 
 def measured_on(
@@ -54,18 +57,39 @@ def measured_on(
 ) -> list[dict[str, float]]:
     """Return `accuracy`, `us_per_sample` and `fit_s` of a method for each share seen.
 
-    It learns once, from whole performances, and classifies of each other one that share of its
-    samples, from the start. A method that cannot learn from so few has NaN throughout. Times are
-    processor times of one thread.
+    It classifies of each performance that share of the samples, from the start. A method that
+    cannot learn from so few has NaN throughout. Times are processor times of one thread.
     """
     method.prepare(data.training)
+    # Of its own for learning: learning once or several times is the same.
+    seed = int(rng.integers(2**32))
+    learned: dict[float, tuple[Fitted, float]] = {}
+    measures = []
+    for share in seen:
+        part = share if method.whole_only else 1.0
+        try:
+            if part not in learned:
+                learned[part] = _timed_fit(method, data.training, part, seed)
+        except TooFewError:
+            measures.append(dict.fromkeys(("accuracy", "us_per_sample", "fit_s"), np.nan))
+            continue
+        fitted, fit_s = learned[part]
+        measures.append({**_classified(fitted, data.test, share), "fit_s": fit_s})
+    return measures
+
+
+def beginning(positions: Array, share: float) -> Array:
+    """Return that share of the positions from the start, three of them at least."""
+    return positions[: max(3, int(np.ceil(share * len(positions))))]
+
+
+def _timed_fit(
+    method: WholeMethod, training: Examples, share: float, seed: int
+) -> tuple[Fitted, float]:
+    examples = [[beginning(positions, share) for positions in own] for own in training]
     began_s = time.thread_time()
-    try:
-        fitted = method.fit(data.training, rng)
-    except TooFewError:
-        return [dict.fromkeys(("accuracy", "us_per_sample", "fit_s"), np.nan) for _ in seen]
-    fit_s = time.thread_time() - began_s
-    return [{**_classified(fitted, data.test, share), "fit_s": fit_s} for share in seen]
+    fitted = method.fit(examples, np.random.default_rng(seed))
+    return fitted, time.thread_time() - began_s
 
 
 def _classified(fitted: Fitted, test: Examples, seen: float) -> dict[str, float]:
@@ -73,7 +97,7 @@ def _classified(fitted: Fitted, test: Examples, seen: float) -> dict[str, float]
     spent_s = 0.0
     for gesteme, own in enumerate(test):
         for positions in own:
-            part = positions[: max(3, int(np.ceil(seen * len(positions))))]
+            part = beginning(positions, seen)
             began_s = time.thread_time()
             scores = fitted.classify(part, complete=seen >= 1)
             spent_s += time.thread_time() - began_s
