@@ -14,12 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recognition.exits import DEFAULT_WEIGHTS
 from hmcs.recognition.gestemes import GestemeParameters
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.learning import EMISSION, baum_welch
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.segment_filter import FilterSettings
 from hmcs.recognition.segments import Segment
+from hmcs.recognition.variants import VariantSettings, split_into_variants
 
 Array = NDArray[np.float64]
 
@@ -30,8 +32,8 @@ class LearningSettings(NamedTuple):
     phases_per_step: float = 0.5
     """Phases of a gesteme for each step of its demonstrations' mean length."""
     phases_at_least: int = 3
-    position_floor_dead_zones: float = 1.0
-    """Standard deviation of positions never below so many dead zones."""
+    position_floor_steps: float = 1.0
+    """Standard deviation of positions never below so many steps."""
     direction_floor: float = 0.2
     """Standard deviation of unit directions never below this."""
     prior_demonstrations: float = 4.0
@@ -42,6 +44,8 @@ class LearningSettings(NamedTuple):
     """With one demonstration: standard deviation of unit directions."""
     refine_iterations: int = 3
     """Iterations of Baum–Welch on means and variances after the alignment by path length."""
+    variants: VariantSettings = VariantSettings()
+    """When demonstrations of one gesteme are so far apart that they are different motions."""
     temperature: float = 4.0
     """See `Scoring`."""
     background_quantile: float = 0.01
@@ -59,14 +63,35 @@ class LearningSettings(NamedTuple):
     """What the task does not foresee."""
 
 
+class _Fitted(NamedTuple):
+    """One variant of a gesteme."""
+
+    gesteme: int
+    share: float
+    """Of the gesteme's demonstrations."""
+    means: Array
+    variances: Array
+    chain: Array
+    """Initial, stay, advance, skip, each (phases,)."""
+    remaining: Array
+    end: Array
+    normal: Array
+
+
 def fit_gestemes(
-    by_gesteme: Sequence[Sequence[Segment]],
-    axes: Sequence[int],
-    dead_zone_m: float,
-    settings: LearningSettings,
+    by_gesteme: Sequence[Sequence[Segment]], axes: Sequence[int], settings: LearningSettings
 ) -> GestemeParameters:
-    """Return the HMM of each gesteme from its segments; see the module's docstring."""
-    observed = [[_observations(segment, axes) for segment in own] for own in by_gesteme]
+    """Return the HMMs of all gestemes from their segments; see the module's docstring.
+
+    The exit is the default one: it is learned from segments left out, see `layers_learning`.
+    """
+    motions = [[segment.motion(axes) for segment in own] for own in by_gesteme]
+    split = split_into_variants([[m.positions for m in own] for own in motions], settings.variants)
+    models = [
+        (g, [motions[g][k] for k in group]) for g, groups in enumerate(split) for group in groups
+    ]
+    step_m = float(np.mean([length for _, own in models for m in own for length in m.lengths]))
+    observed = [[m.observations for m in own] for _, own in models]
     lengths = [float(np.mean([len(o) for o in own])) for own in observed]
     phases = [
         max(settings.phases_at_least, round(length * settings.phases_per_step))
@@ -77,36 +102,76 @@ def fit_gestemes(
         for own, count in zip(observed, phases, strict=True)
     ]
     own_variance = [_smoothed(a.var(axis=0, ddof=1)) if len(a) > 1 else None for a in aligned]
-    prior = _prior_variance(own_variance, lengths, len(axes), dead_zone_m, settings)
-    floor = np.repeat(
-        [settings.position_floor_dead_zones * dead_zone_m, settings.direction_floor], len(axes)
-    )
-    widest = max(phases)
-    shape = (len(by_gesteme), widest, 2 * len(axes))
-    means, variances = np.zeros(shape), np.ones(shape)
-    chain = np.zeros((5, len(by_gesteme), widest))
-    for g, count in enumerate(phases):
-        freedom = len(aligned[g]) - 1
-        own = own_variance[g]
+    prior = _prior_variance(own_variance, lengths, len(axes), step_m, settings)
+    floor = np.repeat([settings.position_floor_steps * step_m, settings.direction_floor], len(axes))
+    fitted = []
+    for k, (g, own_motions) in enumerate(models):
+        count, own = phases[k], own_variance[k]
+        freedom = len(aligned[k]) - 1
         variance = prior if own is None else own
         shrunk = (freedom * variance + settings.prior_demonstrations * prior) / (
             freedom + settings.prior_demonstrations
         )
-        chain[:, g, :count] = _left_right(count, lengths[g])
-        means[g, :count] = aligned[g].mean(axis=0)
-        variances[g, :count] = shrunk + floor**2
+        means = aligned[k].mean(axis=0)
+        variances = np.broadcast_to(shrunk + floor**2, means.shape)
+        chain = _left_right(count, lengths[k])
         if settings.refine_iterations:
-            means[g, :count] = _refined(
-                means[g, :count], variances[g, :count], chain[:, g, :count], observed[g], settings
+            means = _refined(means, variances, chain, observed[k], settings)
+        fitted.append(
+            _Fitted(
+                g,
+                len(own_motions) / len(by_gesteme[g]),
+                means,
+                variances,
+                chain,
+                (count - 0.5 - np.arange(count)) * lengths[k] / count,
+                np.mean([m.positions[-1] for m in own_motions], axis=0),
+                _unit(np.mean([m.passing for m in own_motions], axis=0)),
             )
-    return GestemeParameters(means, variances, *chain)
+        )
+    return _packed(fitted, len(by_gesteme), len(axes), step_m)
 
 
-def _observations(segment: Segment, axes: Sequence[int]) -> Array:
-    """Displacement from the segment's origin after each step, and its direction, shape (T, 2D)."""
-    moves = np.array([step.displacement for step in segment.steps])[:, list(axes)]
-    lengths = np.linalg.norm(moves, axis=1, keepdims=True)
-    return np.hstack([np.cumsum(moves, axis=0), moves / np.maximum(lengths, 1e-12)])
+def _packed(
+    fitted: Sequence[_Fitted], gestemes: int, dimensions: int, step_m: float
+) -> GestemeParameters:
+    own = [[f for f in fitted if f.gesteme == g] for g in range(gestemes)]
+    widest = max(sum(len(f.means) for f in variants) for variants in own)
+    most = max(len(variants) for variants in own)
+    shape = (gestemes, widest)
+    means, variances = np.zeros((*shape, 2 * dimensions)), np.ones((*shape, 2 * dimensions))
+    chain, remaining = np.zeros((4, *shape)), np.zeros(shape)
+    variant = np.zeros(shape, dtype=np.int32)
+    ends, normals = np.zeros((2, gestemes, most, dimensions))
+    for g, variants in enumerate(own):
+        begin = 0
+        for v, f in enumerate(variants):
+            here = slice(begin, begin + len(f.means))
+            means[g, here], variances[g, here] = f.means, f.variances
+            chain[:, g, here] = f.chain
+            chain[0, g, here] *= f.share
+            remaining[g, here], variant[g, here] = f.remaining, v
+            ends[g, v], normals[g, v] = f.end, f.normal
+            begin = here.stop
+    initial, stay, advance, skip = chain
+    return GestemeParameters(
+        means=means,
+        variances=variances,
+        initial=initial,
+        stay=stay,
+        advance=advance,
+        skip=skip,
+        remaining=remaining,
+        variant=variant,
+        ends=ends,
+        normals=normals,
+        exit_weights=DEFAULT_WEIGHTS,
+        step_m=step_m,
+    )
+
+
+def _unit(vector: Array) -> Array:
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
 def _resampled(observations: Array, count: int) -> Array:
@@ -127,31 +192,32 @@ def _prior_variance(
     own: Sequence[Array | None],
     lengths: Sequence[float],
     dimensions: int,
-    dead_zone_m: float,
+    step_m: float,
     settings: LearningSettings,
 ) -> Array:
     seen = [variance.mean(axis=0) for variance in own if variance is not None]
     if seen:
         return np.asarray(np.mean(seen, axis=0))
-    position = settings.prior_position_share * float(np.mean(lengths)) * dead_zone_m
+    position = settings.prior_position_share * float(np.mean(lengths)) * step_m
     return np.repeat([position**2, settings.prior_direction**2], dimensions)
 
 
 def _left_right(phases: int, length: float) -> Array:
-    """Initial, stay, advance, skip, leave, each (phases,), for a mean length in steps.
+    """Initial, stay, advance and skip, each (phases,), for a mean length in steps.
 
     A phase lasts length / phases steps on average; the excess below covers faster and slower hands.
+    Whoever does not leave stays in the last phase.
     """
     dwell = max(length / phases, 0.5)
     stay = max(1.0 - 1.0 / dwell, 0.0) + 0.08
     skip = max(1.0 / dwell - 1.0, 0.0) + 0.08
     advance = 1.0 / dwell - 2.0 * max(1.0 / dwell - 1.0, 0.0) + 0.02
     stay, advance, skip = np.array([stay, advance, skip]) / (stay + advance + skip)
-    chain = np.zeros((5, phases))
+    chain = np.zeros((4, phases))
     chain[0, :2] = 0.8, 0.2
-    chain[1] = stay
-    chain[2, :-1], chain[4, -1] = advance, advance + skip
-    chain[3, :-2], chain[4, -2] = skip, skip
+    chain[1], chain[2, :-1], chain[3, :-2] = stay, advance, skip
+    chain[2, -2] += skip
+    chain[1, -1] = 1.0
     return chain
 
 

@@ -16,28 +16,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.exits import exit_features, exit_probability
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 
 class GestemeParameters(NamedTuple):
-    """The left-right Gaussian HMMs of all gestemes of a model."""
+    """The left-right Gaussian HMMs of all gestemes of a model.
+
+    A gesteme that is performed in several ways has a left-right chain for each of them, its
+    variants, one after the other in its phases.
+    """
 
     means: Array
     """Displacement from the segment's origin, m, then unit direction, shape (G, N, F)."""
     variances: Array
     """Of the same, shape (G, N, F)."""
     initial: Array
-    """P(phase at the segment's first step), shape (G, N); zero in padding."""
+    """P(phase at the segment's first step), shape (G, N)."""
     stay: Array
-    """P(same phase at the next step), shape (G, N)."""
+    """P(same phase at the next step | no exit), shape (G, N); zero in padding."""
     advance: Array
-    """P(next phase), shape (G, N)."""
+    """P(next phase | no exit), shape (G, N)."""
     skip: Array
-    """P(the phase after the next), shape (G, N)."""
-    leave: Array
-    """P(the segment is over), shape (G, N); the four sum to one in each phase."""
+    """P(the phase after the next | no exit), shape (G, N); the three sum to one in each phase."""
+    remaining: Array
+    """Steps from the phase to the end of its variant, shape (G, N)."""
+    variant: Integers
+    """Which variant of its gesteme a phase belongs to, shape (G, N)."""
+    ends: Array
+    """Where a variant ends, from its origin, m, shape (G, V, D)."""
+    normals: Array
+    """Unit direction in which a variant's end is passed, shape (G, V, D)."""
+    exit_weights: Array
+    """Of the exit's logistic regression, shape (10,); see `exits`."""
+    step_m: float
+    """Mean length of a step, m."""
 
 
 class Scoring(NamedTuple):
@@ -100,19 +115,28 @@ class GestemeBank:
         self._phase = np.zeros((0, phases))
         self._origin = np.zeros((0, len(self._axes)))
         self._running = np.zeros(0)
+        self._leaving = np.zeros(0)
+        self._exit_features = np.zeros((0, len(parameters.exit_weights)))
 
     @property
     def held(self) -> tuple[int, ...]:
         """Indices of the gestemes held."""
         return tuple(int(g) for g in self._held)
 
+    @property
+    def exit_features(self) -> Array:
+        """What the exit of each living pair was judged by after the last step, shape (p, 10)."""
+        return self._exit_features
+
     def step(self, step: Step) -> StepEvidence:
         """Score the next step; steps come in order, without gaps."""
         index = step.index
         here, move = step.position[self._axes], step.displacement[self._axes]
-        gesteme, start, phase, exit_probability = self._predict(index)
-        origin = np.concatenate([self._origin, np.repeat(here[None, :], len(self._held), axis=0)])
-        running = np.concatenate([self._running, np.zeros(len(self._held))])
+        gesteme, start, phase = self._predict(index)
+        fresh = len(self._held)
+        origin = np.concatenate([self._origin, np.repeat(here[None, :], fresh, axis=0)])
+        running = np.concatenate([self._running, np.zeros(fresh)])
+        exited = np.concatenate([self._leaving, np.zeros(fresh)])
 
         length = float(np.sqrt((move**2).sum()))
         direction = move / length if length > 0 else np.zeros_like(move)
@@ -128,13 +152,10 @@ class GestemeBank:
         )
         self._gesteme, self._start, self._origin = gesteme[living], start[living], origin[living]
         self._running, self._phase = running[living], (joint / total[:, None])[living]
+        self._exit_features = self._features_of_exit(here + move, direction)
+        self._leaving = exit_probability(self._parameters.exit_weights, self._exit_features)
         return StepEvidence(
-            index,
-            self.held,
-            self._gesteme,
-            self._start,
-            exit_probability[living],
-            log_ratio[living],
+            index, self.held, self._gesteme, self._start, exited[living], log_ratio[living]
         )
 
     def replaced(self, fresh: GestemeBank, keep: Sequence[int]) -> GestemeBank:
@@ -153,6 +174,7 @@ class GestemeBank:
         bank._phase = np.concatenate([self._phase[mine], fresh._phase])[order]
         bank._origin = np.concatenate([self._origin[mine], fresh._origin])[order]
         bank._running = np.concatenate([self._running[mine], fresh._running])[order]
+        bank._leaving = np.concatenate([self._leaving[mine], fresh._leaving])[order]
         return bank
 
     def _log_emissions(self, gesteme: Integers, where: Array, direction: Array) -> Array:
@@ -176,23 +198,31 @@ class GestemeBank:
         distance += shared.take(gesteme, axis=0)
         return distance
 
-    def _predict(self, index: int) -> tuple[Integers, Integers, Array, Array]:
+    def _predict(self, index: int) -> tuple[Integers, Integers, Array]:
         """Move every pair's phases one step on, given no exit, and start a pair per gesteme."""
         p = self._parameters
-        leaving = (self._phase * p.leave[self._gesteme]).sum(axis=1)
         moved = self._phase * p.stay[self._gesteme]
         moved[:, 1:] += (self._phase * p.advance[self._gesteme])[:, :-1]
         moved[:, 2:] += (self._phase * p.skip[self._gesteme])[:, :-2]
-        moved /= np.maximum(1.0 - leaving, 1e-12)[:, None]
         count = len(self._held)
         return (
             np.concatenate([self._gesteme, self._held]),
             np.concatenate([self._start, np.full(count, index, dtype=np.int32)]),
             np.concatenate([moved, p.initial[self._held]]),
-            np.concatenate([np.minimum(leaving, 1.0), np.zeros(count)]),
+        )
+
+    def _features_of_exit(self, there: Array, direction: Array) -> Array:
+        p, gesteme = self._parameters, self._gesteme
+        likely = self._phase.argmax(axis=1)
+        variant = p.variant[gesteme, likely]
+        return exit_features(
+            (self._phase * p.remaining.take(gesteme, axis=0)).sum(axis=1),
+            (there - self._origin - p.ends[gesteme, variant]) / p.step_m,
+            p.normals[gesteme, variant],
+            direction - p.means[gesteme, likely, len(self._axes) :],
         )
 
 
 def _possible(parameters: GestemeParameters) -> NDArray[np.bool_]:
-    chain = parameters.stay + parameters.advance + parameters.skip + parameters.leave
+    chain = parameters.stay + parameters.advance + parameters.skip
     return np.asarray(chain > 0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import steps_of
+from hmcs.recognition.exits import DEFAULT_WEIGHTS, fit_exit
 from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
 from hmcs.recognition.gestemes import GestemeBank, GestemeParameters, Scoring
 from hmcs.recognition.layered import Layers
@@ -34,13 +35,23 @@ def learn_layers(
     """Return what the segment filter learns from segments that cover all gestemes of the task."""
     by_gesteme = [[s for s in segments if s.gesteme == g] for g in range(len(task.gestemes))]
     axes = axes_of(task)
-    parameters = fit_gestemes(by_gesteme, axes, task.dead_zone_m, settings)
+    parameters = fit_gestemes(by_gesteme, axes, settings)
     longest = max(len(segment.steps) for segment in segments)
     window = int(min(settings.window_limit_steps, np.ceil(settings.window_factor * longest)))
     scoring = Scoring(0.0, settings.temperature, window, settings.prune_nats)
     progress("background level and alarm threshold from demonstrations left out")
-    held_out = list(_held_out(by_gesteme, axes, task.dead_zone_m, settings))
-    scoring = scoring._replace(background=_background(held_out, scoring, axes, settings))
+    held_out = list(_held_out(by_gesteme, axes, settings))
+    tracks = [_track(fold.parameters, scoring, axes, s) for fold in held_out for s in fold.segments]
+    if any(len(own) > 1 for own in by_gesteme):
+        ends = [np.arange(len(t.scores)) == len(t.scores) - 1 for t in tracks]
+        weights = fit_exit(np.concatenate([t.exits for t in tracks]), np.concatenate(ends))
+        parameters = parameters._replace(exit_weights=weights)
+        held_out = [
+            _HeldOut(f.parameters._replace(exit_weights=weights), f.segments) for f in held_out
+        ]
+    scores = np.concatenate([t.scores for t in tracks])
+    lowest = float(np.quantile(scores, settings.background_quantile))
+    scoring = scoring._replace(background=lowest - scoring.temperature)
     threshold = _alarm_threshold(held_out, scoring, axes, task, settings)
     return Layers(
         parameters, scoring, settings.filter, AlarmSettings(settings.alarm_window_steps, threshold)
@@ -49,20 +60,33 @@ def learn_layers(
 
 def check_layers(layers: Layers, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task."""
-    shape = layers.parameters.initial.shape
-    emissions = (*shape, 2 * len(axes_of(task)))
-    for field, array in layers.parameters._asdict().items():
-        expected = emissions if field in ("means", "variances") else shape
-        if array.shape != expected or array.dtype != np.float64:
+    p = layers.parameters
+    shape, dimensions = p.initial.shape, len(axes_of(task))
+    variants = p.ends.shape[:2]
+    expected = {
+        "means": (*shape, 2 * dimensions),
+        "variances": (*shape, 2 * dimensions),
+        "ends": (*variants, dimensions),
+        "normals": (*variants, dimensions),
+        "exit_weights": DEFAULT_WEIGHTS.shape,
+    }
+    for field, value in p._asdict().items():
+        if field == "step_m":
+            continue
+        kind = np.int32 if field == "variant" else np.float64
+        wanted = expected.get(field, shape)
+        if value.shape != wanted or value.dtype != kind:
             raise ValueError(
-                f"array {field!r} is {array.dtype} of shape {array.shape}, "
-                f"expected float64 of shape {expected}"
+                f"array {field!r} is {value.dtype} of shape {value.shape}, "
+                f"expected {np.dtype(kind)} of shape {wanted}"
             )
-    if shape[:1] != (len(task.gestemes),) or not (layers.parameters.variances > 0).all():
+    if shape[:1] != (len(task.gestemes),) or not (p.variances > 0).all():
         raise ValueError(
             f"its arrays are for {shape[0]} gestemes with positive variances, "
             f"its task has {len(task.gestemes)}"
         )
+    if not p.step_m > 0 or variants[0] != shape[0] or (p.variant >= variants[1]).any():
+        raise ValueError("its variants or its step length are none")
 
 
 class _HeldOut(NamedTuple):
@@ -73,10 +97,7 @@ class _HeldOut(NamedTuple):
 
 
 def _held_out(
-    by_gesteme: Sequence[Sequence[Segment]],
-    axes: Sequence[int],
-    dead_zone_m: float,
-    settings: LearningSettings,
+    by_gesteme: Sequence[Sequence[Segment]], axes: Sequence[int], settings: LearningSettings
 ) -> list[_HeldOut]:
     """Leave out one segment of each gesteme in turn; with one demonstration, leave out none."""
     rounds = max(len(own) for own in by_gesteme)
@@ -84,23 +105,30 @@ def _held_out(
     for r in range(rounds):
         kept = [[s for k, s in enumerate(own) if len(own) == 1 or k != r] for own in by_gesteme]
         left = tuple(own[r] for own in by_gesteme if r < len(own))
-        result.append(_HeldOut(fit_gestemes(kept, axes, dead_zone_m, settings), left))
+        result.append(_HeldOut(fit_gestemes(kept, axes, settings), left))
     return result
 
 
-def _background(
-    held_out: Sequence[_HeldOut], scoring: Scoring, axes: Sequence[int], settings: LearningSettings
-) -> float:
-    scores: list[float] = []
-    for fold in held_out:
-        for segment in fold.segments:
-            # Nothing is pruned: the log-likelihood of the true hypothesis is wanted whatever it is.
-            lenient = scoring._replace(prune_nats=np.inf, temperature=1.0)
-            bank = GestemeBank(fold.parameters, lenient, axes, [segment.gesteme])
-            for step in segment.steps:
-                evidence = bank.step(step)
-                scores.append(float(evidence.log_ratio[0]))
-    return float(np.quantile(scores, settings.background_quantile)) - scoring.temperature
+class _Track(NamedTuple):
+    """A segment under the model of its own gesteme, its start known."""
+
+    scores: Array
+    """Log density of each step, nats, shape (T,)."""
+    exits: Array
+    """What the exit after each step is judged by, shape (T, 10)."""
+
+
+def _track(
+    parameters: GestemeParameters, scoring: Scoring, axes: Sequence[int], segment: Segment
+) -> _Track:
+    # Nothing is pruned: the log-likelihood of the true hypothesis is wanted whatever it is.
+    lenient = scoring._replace(prune_nats=np.inf, temperature=1.0, background=0.0)
+    bank = GestemeBank(parameters, lenient, axes, [segment.gesteme])
+    scores, exits = [], []
+    for k, step in enumerate(segment.steps):
+        scores.append(float(bank.step(step._replace(index=k)).log_ratio[0]))
+        exits.append(bank.exit_features[0])
+    return _Track(np.array(scores), np.array(exits))
 
 
 def _alarm_threshold(

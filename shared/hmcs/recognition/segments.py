@@ -33,6 +33,38 @@ class Segment(NamedTuple):
     positions: Array
     """m, shape (T, 3)."""
     steps: tuple[Step, ...]
+    after: Array | None = None
+    """Displacement of the step that followed it, m, shape (3,); None where none is known."""
+
+    def motion(self, axes: Sequence[int]) -> Motion:
+        """Return the motion along these axes, from its own origin."""
+        moves = np.array([step.displacement for step in self.steps])[:, list(axes)]
+        lengths = np.linalg.norm(moves, axis=1)
+        directions = moves / np.maximum(lengths, 1e-12)[:, None]
+        positions = np.vstack([np.zeros(len(axes)), np.cumsum(moves, axis=0)])
+        passing = directions[-2:].mean(axis=0)
+        if self.after is not None:
+            after = self.after[list(axes)]
+            passing = passing + after / max(float(np.linalg.norm(after)), 1e-12)
+        return Motion(positions, lengths, directions, passing)
+
+
+class Motion(NamedTuple):
+    """A segment's motion along D axes in T steps."""
+
+    positions: Array
+    """From the segment's origin, m, shape (T + 1, D)."""
+    lengths: Array
+    """Of the steps, m, shape (T,)."""
+    directions: Array
+    """Of the steps, unit vectors, shape (T, D)."""
+    passing: Array
+    """About the direction in which the end is passed, shape (D,)."""
+
+    @property
+    def observations(self) -> Array:
+        """Place after each step, m, and its direction, shape (T, 2D)."""
+        return np.hstack([self.positions[1:], self.directions])
 
 
 class LabeledSteps(NamedTuple):
@@ -53,9 +85,9 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
     """
     if not demonstrations:
         raise LearningError(f"no demonstrations of task {task.name!r}: give at least one")
-    segments = []
+    segments: list[Segment] = []
     for demonstration in demonstrations:
-        labeled = False
+        labeled, own, last = False, list[Segment](), -1
         for label, run in groupby(
             range(len(demonstration.positions)), key=demonstration.states.__getitem__
         ):
@@ -76,7 +108,11 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
                     f"needed: demonstrate it larger or lower dead_zone_m ({task.dead_zone_m})"
                 )
             state, gesteme = _meant(task, label, demonstration.name)
-            segments.append(Segment(demonstration.name, state, gesteme, positions, steps))
+            if own and samples[0] == last + 1:
+                own[-1] = own[-1]._replace(after=steps[0].displacement)
+            own.append(Segment(demonstration.name, state, gesteme, positions, steps))
+            last = samples[-1]
+        segments += own
         if not labeled:
             raise LearningError(
                 f"demonstration {demonstration.name!r} has no labels: add a column 'state' with "
