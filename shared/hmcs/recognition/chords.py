@@ -96,7 +96,8 @@ class Chords:
         explained = np.tensordot(weights, self._form, axes=1)
         along = directions @ self.positions.T
         forward = along[:, :, None] > along[:, None, :]
-        return np.maximum(np.where(forward, self._trace - explained, self._everything), 0.0)
+        costs = np.where(forward, self._trace - explained, self._everything)
+        return np.asarray(np.maximum(costs, 0.0))
 
     def form(self, first: int, last: int) -> Array:
         """Return Q of a stretch, shape (D, D)."""
