@@ -22,6 +22,16 @@ from hmcs_laboratory.figures.clusters import (
     cluster_centers,
     elbow_criterion,
 )
+from hmcs_laboratory.figures.curves import (
+    GestemeCurvesSettings,
+    NoiseCurvesSettings,
+    SymbolCurvesSettings,
+    TrainingCurvesSettings,
+    gesteme_curves,
+    noise_curves,
+    symbol_curves,
+    training_curves,
+)
 from hmcs_laboratory.figures.figure import Figure
 from hmcs_laboratory.figures.tasks import (
     DrawnFollowedSettings,
@@ -50,6 +60,11 @@ _PLANAR = (
 )
 _FAST_ELBOW = {"repeats": 3}
 _FAST_LINES = {"repeats": 2, "performances": 2}
+_FAST_TRIALS = {"trials": 2, "unfloored_trials": 1, "test": 3}
+_FAST_NOISE = {**_FAST_TRIALS, "noise": (0.05, 0.25, 0.45), "gestemes": 5}
+_FAST_COUNT = {**_FAST_TRIALS, "gestemes": (2, 5, 10)}
+_FAST_TRAINING = {**_FAST_TRIALS, "training": (1, 2, 5), "gestemes": 5}
+_FAST_SYMBOLS = {**_FAST_TRIALS, "symbols": (4, 10, 25), "gestemes": 5}
 _FAST_TASK = {"performances": 2}
 
 FIGURES: tuple[Figure[Any], ...] = (
@@ -148,6 +163,80 @@ FIGURES: tuple[Figure[Any], ...] = (
         "red dots mark the change from one primitive to the next.",
         typical_trajectories,
         TrajectorySettings(),
+    ),
+    Figure(
+        "4.3",
+        "Classification against noise, 2D",
+        "Share of gestemes recognized by OD, MD and FFT HMMs against κ, for lines, circles and "
+        "both mixed: usable up to κ of 0.2 to 0.25; from 0.3 to 0.5 almost as bad as guessing. OD "
+        "appears to be the least sensitive to noise.",
+        noise_curves,
+        NoiseCurvesSettings(),
+        _FAST_NOISE,
+    ),
+    Figure(
+        "4.4",
+        "Classification against noise, 3D",
+        "Share of gestemes recognized by OD, MD and FFT HMMs against κ, for lines, circles and "
+        "both mixed: usable up to κ of 0.2 to 0.25; from 0.3 to 0.5 almost as bad as guessing. OD "
+        "appears to be the least sensitive to noise.",
+        noise_curves,
+        NoiseCurvesSettings(dimensions=3),
+        _FAST_NOISE,
+    ),
+    Figure(
+        "4.5",
+        "Classification against the number of gestemes, 2D",
+        "The same against the number of gestemes at κ = 0.15: it drops almost linearly from 100 % "
+        "to about 60 % for 25. In 3D it is a bit better: gestemes are less likely to be similar.",
+        gesteme_curves,
+        GestemeCurvesSettings(),
+        _FAST_COUNT,
+    ),
+    Figure(
+        "4.6",
+        "Classification against the number of gestemes, 3D",
+        "The same against the number of gestemes at κ = 0.15: it drops almost linearly from 100 % "
+        "to about 60 % for 25. In 3D it is a bit better: gestemes are less likely to be similar.",
+        gesteme_curves,
+        GestemeCurvesSettings(dimensions=3),
+        _FAST_COUNT,
+    ),
+    Figure(
+        "4.7",
+        "Classification against training sequences, 2D",
+        "The same against the number of training sequences: quite high even for two.",
+        training_curves,
+        TrainingCurvesSettings(),
+        _FAST_TRAINING,
+    ),
+    Figure(
+        "4.8",
+        "Classification against training sequences, 3D",
+        "The same against the number of training sequences: quite high even for two.",
+        training_curves,
+        TrainingCurvesSettings(dimensions=3),
+        _FAST_TRAINING,
+    ),
+    Figure(
+        "4.9",
+        "Classification against symbols, 2D",
+        "The same against the number of symbols, which means different things for OD, and for MD "
+        "and FFT: not crucial, but too few cannot tell directions apart and too many do not "
+        "generalize.",
+        symbol_curves,
+        SymbolCurvesSettings(),
+        _FAST_SYMBOLS,
+    ),
+    Figure(
+        "4.10",
+        "Classification against symbols, 3D",
+        "The same against the number of symbols, which means different things for OD, and for MD "
+        "and FFT: not crucial, but too few cannot tell directions apart and too many do not "
+        "generalize.",
+        symbol_curves,
+        SymbolCurvesSettings(dimensions=3),
+        _FAST_SYMBOLS,
     ),
     Figure(
         "4.11",

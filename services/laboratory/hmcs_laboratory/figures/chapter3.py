@@ -249,8 +249,8 @@ def drawn_matrix(settings: DrawnLinesSettings, rng: np.random.Generator) -> Draw
         "successors": successors,
     }
     found = (
-        f"{counted(count, 'state')}, followed by {listed([str(n) for n in successors])} others with "
-        "more than 1 % a step. States that several strokes share have several successors: no "
+        f"{counted(count, 'state')}, followed by {listed([str(n) for n in successors])} others "
+        "with more than 1 % a step. States that several strokes share have several successors: no "
         "sequence is extracted."
         if max(successors) > 1
         else f"{counted(count, 'state')}, each followed by one other at most."

@@ -21,6 +21,13 @@ Array = NDArray[np.float64]
 COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
 """Told apart by all kinds of color vision; states beyond them begin again, with other marks."""
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h")
+METHOD_COLORS = {
+    "od-hmm": COLORS[0],
+    "md-hmm": COLORS[1],
+    "fft-hmm": COLORS[2],
+    "hmcs-gestemes": COLORS[3],
+}
+METHOD_MARKS = {"od-hmm": "o", "md-hmm": "s", "fft-hmm": "^", "hmcs-gestemes": "D"}
 UNKNOWN_COLOR = "#8C8C8C"
 INK = "#222222"
 FAINT = "#888888"
@@ -134,10 +141,10 @@ def label_space(ax: Axes, dimensions: int, unit: str = "m") -> None:
     else:
         # Only axes in space have a third one.
         space: Any = ax
-        space.set_zlabel(f"z, {unit}")
+        space.set_zlabel(f"z, {unit}", labelpad=12.0)
         sides = np.ptp([space.get_xlim(), space.get_ylim(), space.get_zlim()], axis=1)
         # A little smaller than its place, which has no room for the labels.
-        space.set_box_aspect(sides, zoom=0.85)
+        space.set_box_aspect(sides, zoom=0.8)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.pane.set_facecolor("white")
             axis.pane.set_edgecolor(GRID_COLOR)

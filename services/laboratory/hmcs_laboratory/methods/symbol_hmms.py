@@ -99,6 +99,11 @@ def fit_symbol_hmms(
     kinds = settings.symbols if observed == "od" else settings.bins
     if isinstance(encoder, Codebook):
         kinds = len(encoder.centers)
+    # Baum–Welch needs a transition.
+    sequences = [
+        [symbols if len(symbols) > 1 else symbols.repeat(2, axis=0) for symbols in own]
+        for own in sequences
+    ]
     models = [_started(own, kinds, settings) for own in sequences]
     learned = _learned(models, sequences, settings.iterations)
     tables = [
