@@ -14,6 +14,7 @@ from hmcs_laboratory.studies.gestemes import (
 )
 from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
 from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
+from hmcs_laboratory.studies.unlabeled import UNLABELED
 from hmcs_laboratory.study import Study
 
 STUDIES: tuple[Study[Any], ...] = (
@@ -27,4 +28,5 @@ STUDIES: tuple[Study[Any], ...] = (
     ORDER,
     LASA,
     LASA_TASKS,
+    UNLABELED,
 )
