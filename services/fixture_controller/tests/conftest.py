@@ -26,6 +26,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
+from hmcs.recognition.exits import DEFAULT_WEIGHTS
 from hmcs.recognition.gestemes import GestemeParameters, Scoring
 from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import Model
@@ -76,7 +77,12 @@ def model(name: str, length_m: float) -> Model:
                 stay=phases,
                 advance=phases,
                 skip=phases,
-                leave=phases,
+                remaining=phases,
+                variant=np.zeros((1, 2), dtype=np.int32),
+                ends=np.zeros((1, 1, 3)),
+                normals=np.zeros((1, 1, 3)),
+                exit_weights=DEFAULT_WEIGHTS,
+                step_m=0.01,
             ),
             Scoring(0.0, 1.0, 100, 30.0),
             FilterSettings(),

@@ -58,7 +58,8 @@ def exit_features(remaining: Array, from_end: Array, normal: Array, innovation: 
 
 def exit_probability(weights: Array, features: Array) -> Array:
     """Return P(leaving before the next step), shape (p,)."""
-    odds = np.clip(features @ weights, -30.0, 30.0)
+    # Row by row: a matrix product would round by how many pairs there are.
+    odds = np.clip((features * weights).sum(axis=1), -30.0, 30.0)
     return np.clip(1.0 / (1.0 + np.exp(-odds)), LOWEST, HIGHEST)
 
 

@@ -29,12 +29,12 @@ Array = NDArray[np.float64]
 class LearningSettings(NamedTuple):
     """The choices of learning; defaults are good without tuning."""
 
-    phases_per_step: float = 0.5
+    phases_per_step: float = 0.8
     """Phases of a gesteme for each step of its demonstrations' mean length."""
     phases_at_least: int = 3
     position_floor_steps: float = 1.0
     """Standard deviation of positions never below so many steps."""
-    direction_floor: float = 0.2
+    direction_floor: float = 0.1
     """Standard deviation of unit directions never below this."""
     prior_demonstrations: float = 4.0
     """The variances of all gestemes together count as much as so many demonstrations."""

@@ -64,7 +64,7 @@ def test_learning_twice_gives_the_same_model(task, performances):
 
 def test_every_phase_leads_somewhere_with_probability_one(model):
     p = model.knowledge.parameters
-    total = p.stay + p.advance + p.skip + p.leave
+    total = p.stay + p.advance + p.skip
     possible = total > 0
     np.testing.assert_allclose(total[possible], 1.0)
     np.testing.assert_allclose(p.initial.sum(axis=1), 1.0)

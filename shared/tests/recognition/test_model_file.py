@@ -124,7 +124,7 @@ def test_numbers_that_cannot_be_are_told(model, tmp_path, field, value, message)
 
 
 def test_arrays_that_do_not_fit_together_are_told(model, tmp_path):
-    short = model.knowledge.parameters.leave[:, :-1]
-    save_model(with_parameters(model, leave=short), tmp_path / "m")
-    with pytest.raises(ModelFileError, match="'leave' is float64 of shape"):
+    short = model.knowledge.parameters.skip[:, :-1]
+    save_model(with_parameters(model, skip=short), tmp_path / "m")
+    with pytest.raises(ModelFileError, match="'skip' is float64 of shape"):
         load_model(tmp_path / "m")
