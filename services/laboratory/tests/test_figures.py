@@ -1,6 +1,7 @@
 """The figures: all of the issue's list, drawn, told by what they show, and the same for a seed."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,8 +32,10 @@ CURVES = {
 }
 
 
-def tiny(figure):
+@cache
+def tiny(number):
     """The figure with settings that take a moment."""
+    (figure,) = find_figures([number])
     known = type(figure.settings).model_fields
     few = {**TINY, **CURVES.get(figure.draw.__name__, {})}
     changes = {name: value for name, value in few.items() if name in known}
@@ -69,7 +72,7 @@ def test_figures_that_share_data_are_made_of_the_same_settings_fast_or_not():
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.number)
 def test_a_figure_is_drawn_and_told_with_numbers(figure):
-    made = tiny(figure)
+    made = tiny(figure.number)
     assert made.files.png.startswith(b"\x89PNG")
     assert made.files.png.endswith(b"IEND\xaeB`\x82")
     assert made.files.svg.strip().endswith(b"</svg>")
@@ -105,8 +108,7 @@ def test_more_clusters_are_nearer_to_the_vectors():
 
 
 def test_curves_tell_the_share_recognized_of_every_method_with_its_interval():
-    (figure,) = find_figures(["4.3"])
-    numbers = tiny(figure).numbers
+    numbers = tiny("4.3").numbers
     for method in ("od", "md", "fft"):
         for floor in ("", "-no-floor"):
             shares = numbers[f"line_{method}-hmm{floor}"]
@@ -117,11 +119,10 @@ def test_curves_tell_the_share_recognized_of_every_method_with_its_interval():
 
 def test_delays_belong_to_the_changes_drawn():
     (figure,) = find_figures(["3.3"])
-    numbers = tiny(figure).numbers
+    numbers = tiny(figure.number).numbers
     assert len(numbers["delays"]) == figure.settings.lines - 1
     assert len(numbers["order"]) == numbers["directions_found"]
-    (figure,) = find_figures(["4.12"])
-    numbers = tiny(figure).numbers
+    numbers = tiny("4.12").numbers
     assert len(numbers["changes_at"]) == 4
     for who in ("lhmm", "segment_filter"):
         assert len(numbers[f"{who}_switch_delays"]) == 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,9 +22,7 @@ from hmcs_laboratory.figures.drawing import (
     listed,
     new_picture,
 )
-from hmcs_laboratory.studies.gestemes import GESTEME_COUNT, NOISE, TRAINING_COUNT
-from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
-from hmcs_laboratory.study import Study, StudySettings
+from hmcs_laboratory.study import StudySettings
 from hmcs_laboratory.summary import CI95, Row, rows_of
 
 Kind = Literal["line", "circle", "mixed"]
@@ -105,7 +103,7 @@ Curves = Mapping[tuple[str, str], Mapping[float, _Point]]
 
 def noise_curves(settings: NoiseCurvesSettings, rng: np.random.Generator) -> Drawn:
     """Draw figures 4.3 and 4.4."""
-    curves = _measured(NOISE, settings, "noise", rng)
+    curves = _measured("noise", settings, "noise", rng)
     guess = 1 / settings.gestemes
     picture = _panels(settings, curves, "noise κ", dict.fromkeys(settings.noise, guess))
     at = min(settings.noise, key=lambda noise: abs(noise - 0.35))
@@ -119,7 +117,7 @@ def noise_curves(settings: NoiseCurvesSettings, rng: np.random.Generator) -> Dra
 
 def gesteme_curves(settings: GestemeCurvesSettings, rng: np.random.Generator) -> Drawn:
     """Draw figures 4.5 and 4.6."""
-    curves = _measured(GESTEME_COUNT, settings, "gestemes", rng)
+    curves = _measured("gesteme-count", settings, "gestemes", rng)
     guess = {float(x): 1 / x for x in settings.gestemes}
     picture = _panels(settings, curves, "number of gestemes", guess)
     most = max(settings.gestemes)
@@ -132,7 +130,7 @@ def gesteme_curves(settings: GestemeCurvesSettings, rng: np.random.Generator) ->
 
 def training_curves(settings: TrainingCurvesSettings, rng: np.random.Generator) -> Drawn:
     """Draw figures 4.7 and 4.8."""
-    curves = _measured(TRAINING_COUNT, settings, "training", rng)
+    curves = _measured("training-count", settings, "training", rng)
     guess = 1 / settings.gestemes
     label = "training sequences of each gesteme"
     few = min(settings.training, key=lambda training: abs(training - 2))
@@ -149,7 +147,7 @@ def training_curves(settings: TrainingCurvesSettings, rng: np.random.Generator) 
 
 def symbol_curves(settings: SymbolCurvesSettings, rng: np.random.Generator) -> Drawn:
     """Draw figures 4.9 and 4.10."""
-    curves = _measured(SYMBOL_COUNT, settings, "symbols", rng)
+    curves = _measured("symbol-count", settings, "symbols", rng)
     guess = 1 / settings.gestemes
     most = max(settings.symbols)
     label = "symbols: centers (OD), bins an axis (MD, FFT)"
@@ -164,12 +162,14 @@ def symbol_curves(settings: SymbolCurvesSettings, rng: np.random.Generator) -> D
     return _drawn(picture, curves, settings, "symbols", "with", differs)
 
 
-def _measured(
-    study: Study[Any], settings: CurvesSettings, varies: str, rng: np.random.Generator
-) -> Curves:
-    """Run the study for each kind of gesteme."""
+def _measured(name: str, settings: CurvesSettings, varies: str, rng: np.random.Generator) -> Curves:
+    """Run the study of that name for each kind of gesteme."""
+    # Peers take seconds to import, which figures without them need not wait for.
+    from hmcs_laboratory.studies import STUDIES
+
+    (study,) = (study for study in STUDIES if study.name == name)
     of_study = set(study.settings.model_fields)
-    given = {name: value for name, value in settings.model_dump().items() if name in of_study}
+    given = {field: value for field, value in settings.model_dump().items() if field in of_study}
     curves: dict[tuple[str, str], dict[float, _Point]] = {}
     for kind, streams in zip(settings.kinds, rng.spawn(len(settings.kinds)), strict=True):
         trials = []
@@ -255,9 +255,7 @@ def _curve(ax: Axes, method: str, points: Mapping[float, _Point], aside_points: 
         linewidth=1.6,
         elinewidth=0.9,
         capsize=2,
-        transform=offset_copy(
-            ax.transData, fig=ax.get_figure(root=True), x=aside_points, units="points"
-        ),
+        transform=aside,
     )
 
 
