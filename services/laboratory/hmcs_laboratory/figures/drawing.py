@@ -133,7 +133,7 @@ def draw_path(ax: Axes, positions: ArrayLike, **style: Any) -> None:
 
 def label_space(ax: Axes, dimensions: int, unit: str = "m") -> None:
     """Name the axes of space, and give them one scale."""
-    pad = 4.0 if dimensions == 2 else 9.0
+    pad = 4.0 if dimensions == 2 else 12.0
     ax.set_xlabel(f"x, {unit}", labelpad=pad)
     ax.set_ylabel(f"y, {unit}", labelpad=pad)
     if dimensions == 2:
@@ -141,10 +141,11 @@ def label_space(ax: Axes, dimensions: int, unit: str = "m") -> None:
     else:
         # Only axes in space have a third one.
         space: Any = ax
-        space.set_zlabel(f"z, {unit}", labelpad=12.0)
+        space.set_zlabel(f"z, {unit}", labelpad=pad)
         sides = np.ptp([space.get_xlim(), space.get_ylim(), space.get_zlim()], axis=1)
-        # A little smaller than its place, which has no room for the labels.
+        # The layout leaves no room for the labels of axes in space: smaller, and off the margin.
         space.set_box_aspect(sides, zoom=0.8)
+        space.get_figure(root=True).get_layout_engine().set(rect=(0.0, 0.0, 0.96, 1.0))
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.pane.set_facecolor("white")
             axis.pane.set_edgecolor(GRID_COLOR)
