@@ -48,6 +48,9 @@ class LearningSettings(NamedTuple):
     """When demonstrations of one gesteme are so far apart that they are different motions."""
     temperature: float = 4.0
     """See `Scoring`."""
+    alignment_sigma: float = 0.0
+    """Standard deviation of size and turn (rad) in which a gesteme may be performed; 0.16
+    recognizes ±30 % and ±15°, 0 takes gestemes as they were demonstrated."""
     background_quantile: float = 0.01
     """The background is one temperature below this quantile of the log-likelihoods of steps of
     demonstrations left out of learning."""

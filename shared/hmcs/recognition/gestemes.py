@@ -3,6 +3,7 @@
 A gesteme is a left-right Gaussian HMM whose phases observe where the hand is relative to the
 segment's origin and which way it goes. What a pair (gesteme, start s) makes of step t is a pure
 function of steps s..t: it depends on no other pair, no task and no other classifier, to the bit.
+With an alignment each pair scales and turns its gesteme to what it has seen; see `alignment`.
 Shapes: G gestemes, N phases (the longest gesteme's; shorter ones are padded with impossible
 phases), D axes looked at, F = 2·D observed dimensions, p living pairs.
 """
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition import alignment
+from hmcs.recognition.alignment import Alignment
 from hmcs.recognition.exits import exit_features, exit_probability
 
 Array = NDArray[np.float64]
@@ -67,6 +70,8 @@ class Scoring(NamedTuple):
     """A start older than this is dropped."""
     prune_nats: float
     """A pair whose running ratio falls below minus this is dropped."""
+    alignment: Alignment = Alignment()
+    """In what size and turn a gesteme may be performed."""
 
 
 class StepEvidence(NamedTuple):
@@ -103,11 +108,17 @@ class GestemeBank:
         # A dimension each, (F, G, N): see `_log_emissions`.
         self._means = np.ascontiguousarray(np.moveaxis(parameters.means, 2, 0))
         self._precisions = np.ascontiguousarray(np.moveaxis(1.0 / parameters.variances, 2, 0))
-        with np.errstate(divide="ignore"):
-            log_possible = np.where(_possible(parameters), 0.0, -np.inf)
+        possible = _possible(parameters)
+        log_possible = np.where(possible, 0.0, -np.inf)
         self._log_scale = (
             -0.5 * np.log(2.0 * np.pi * parameters.variances).sum(axis=2) + log_possible
         )
+        self._aligned: alignment.Phases | None = None
+        if scoring.alignment.sigma > 0:
+            self._aligned = alignment.phases_of(
+                parameters.means, parameters.variances, possible, scoring.alignment
+            )
+        self._similarity = alignment.as_learned(0, len(self._axes))
         self._held = np.array(sorted(held), dtype=np.int32)
         phases = parameters.means.shape[1]
         self._gesteme = np.zeros(0, dtype=np.int32)
@@ -140,7 +151,15 @@ class GestemeBank:
 
         length = float(np.sqrt((move**2).sum()))
         direction = move / length if length > 0 else np.zeros_like(move)
-        log_emission = self._log_emissions(gesteme, here + move - origin, direction)
+        where = here + move - origin
+        similarity = self._similarity
+        if self._aligned is None:
+            log_emission = self._log_emissions(gesteme, where, direction)
+        else:
+            similarity = alignment.joined(similarity, alignment.as_learned(fresh, len(here)))
+            log_emission = alignment.log_densities(
+                self._aligned, similarity, gesteme, where, direction
+            )
         top = log_emission.max(axis=1)
         joint = phase * np.exp(log_emission - top[:, None])
         total = np.maximum(joint.sum(axis=1), 1e-300)
@@ -152,6 +171,14 @@ class GestemeBank:
         )
         self._gesteme, self._start, self._origin = gesteme[living], start[living], origin[living]
         self._running, self._phase = running[living], (joint / total[:, None])[living]
+        if self._aligned is not None:
+            self._similarity = alignment.updated(
+                self._aligned,
+                alignment.picked(similarity, living),
+                self._gesteme,
+                self._phase,
+                where[living],
+            )
         self._exit_features = self._features_of_exit(here + move, direction)
         self._leaving = exit_probability(self._parameters.exit_weights, self._exit_features)
         return StepEvidence(
@@ -175,6 +202,9 @@ class GestemeBank:
         bank._origin = np.concatenate([self._origin[mine], fresh._origin])[order]
         bank._running = np.concatenate([self._running[mine], fresh._running])[order]
         bank._leaving = np.concatenate([self._leaving[mine], fresh._leaving])[order]
+        if self._aligned is not None:
+            both = alignment.joined(alignment.picked(self._similarity, mine), fresh._similarity)
+            bank._similarity = alignment.picked(both, order)
         return bank
 
     def _log_emissions(self, gesteme: Integers, where: Array, direction: Array) -> Array:
@@ -215,11 +245,20 @@ class GestemeBank:
         p, gesteme = self._parameters, self._gesteme
         likely = self._phase.argmax(axis=1)
         variant = p.variant[gesteme, likely]
+        remaining = (self._phase * p.remaining.take(gesteme, axis=0)).sum(axis=1)
+        ends, normals = p.ends[gesteme, variant], p.normals[gesteme, variant]
+        seen = np.broadcast_to(direction, normals.shape)
+        if self._aligned is not None:
+            similarity = self._similarity
+            remaining = remaining * (1.0 + similarity.growth)
+            ends = alignment.placed(similarity, ends)
+            normals = alignment.turned(similarity, normals)
+            seen = alignment.turned(similarity, seen, back=True)
         return exit_features(
-            (self._phase * p.remaining.take(gesteme, axis=0)).sum(axis=1),
-            (there - self._origin - p.ends[gesteme, variant]) / p.step_m,
-            p.normals[gesteme, variant],
-            direction - p.means[gesteme, likely, len(self._axes) :],
+            remaining,
+            (there - self._origin - ends) / p.step_m,
+            normals,
+            seen - p.means[gesteme, likely, len(self._axes) :],
         )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import steps_of
+from hmcs.recognition.alignment import Alignment
 from hmcs.recognition.exits import DEFAULT_WEIGHTS, fit_exit
 from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
 from hmcs.recognition.gestemes import GestemeBank, GestemeParameters, Scoring
@@ -38,7 +39,8 @@ def learn_layers(
     parameters = fit_gestemes(by_gesteme, axes, settings)
     longest = max(len(segment.steps) for segment in segments)
     window = int(min(settings.window_limit_steps, np.ceil(settings.window_factor * longest)))
-    scoring = Scoring(0.0, settings.temperature, window, settings.prune_nats)
+    aligned = Alignment(settings.alignment_sigma, settings.temperature)
+    scoring = Scoring(0.0, settings.temperature, window, settings.prune_nats, aligned)
     progress("background level and alarm threshold from demonstrations left out")
     held_out = list(_held_out(by_gesteme, axes, settings))
     tracks = [_track(fold.parameters, scoring, axes, s) for fold in held_out for s in fold.segments]
