@@ -86,7 +86,7 @@ def model(name: str, length_m: float) -> Model:
             ),
             Scoring(0.0, 1.0, 100, 30.0),
             FilterSettings(),
-            AlarmSettings(20, -5.0),
+            AlarmSettings(20, -5.0, -20.0),
         ),
         path_points=(np.array([[0.0, 0, 0], [length_m, 0, 0]]),),
         path_spreads=(np.full(2, 0.005),),

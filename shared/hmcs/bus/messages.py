@@ -278,7 +278,7 @@ class Belief(Message):
     log_likelihood: float = 0.0
     """Of step t given all before it, against the background level, nats."""
     mean_log_likelihood: float = 0.0
-    """Mean of it over the model's alarm window."""
+    """How well the last steps fit the task: mean over the model's alarm window, nats."""
     unknown_alarm: bool = False
     """True where that mean is below the threshold learned from the demonstrations."""
     missing_gestemes: tuple[Name, ...] = ()

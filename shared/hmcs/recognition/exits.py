@@ -60,7 +60,7 @@ def exit_probability(weights: Array, features: Array) -> Array:
     """Return P(leaving before the next step), shape (p,)."""
     # Row by row: a matrix product would round by how many pairs there are.
     odds = np.clip((features * weights).sum(axis=1), -30.0, 30.0)
-    return np.clip(1.0 / (1.0 + np.exp(-odds)), LOWEST, HIGHEST)
+    return np.asarray(np.clip(1.0 / (1.0 + np.exp(-odds)), LOWEST, HIGHEST))
 
 
 def fit_exit(features: Array, left: NDArray[np.bool_]) -> Array:

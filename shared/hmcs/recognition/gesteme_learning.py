@@ -60,8 +60,9 @@ class LearningSettings(NamedTuple):
     window_limit_steps: int = 300
     """...but at most this."""
     alarm_window_steps: int = 20
-    alarm_quantile: float = 0.01
-    """The alarm's threshold is this quantile of window means on demonstrations left out."""
+    unknown_rise: float = 0.9
+    """The background is raised by so much of the alarm's threshold: then unknown motion is not
+    only told by the alarm but becomes the most probable state of the filter."""
     filter: FilterSettings = FilterSettings()
     """What the task does not foresee."""
 

@@ -70,7 +70,7 @@ class TaskRecognizer:
     def step(self, evidence: StepEvidence) -> Recognition:
         """Take the evidence for the next step."""
         belief = self._filter.step(evidence)
-        return Recognition(belief, *self._alarm.step(belief.log_likelihood))
+        return Recognition(belief, *self._alarm.step(belief.log_likelihood, belief.unknown))
 
 
 class LayeredRecognizer:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.motion.steps import steps_of
+from hmcs.motion.steps import Step
 from hmcs.recognition.alignment import Alignment
 from hmcs.recognition.exits import DEFAULT_WEIGHTS, fit_exit
 from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
@@ -21,7 +21,7 @@ from hmcs.recognition.model import axes_of
 from hmcs.recognition.segment_filter import SegmentFilter
 from hmcs.recognition.segments import Segment
 from hmcs.recognition.task_chain import chain_of
-from hmcs.recognition.unknown import AlarmSettings
+from hmcs.recognition.unknown import fit_of, learn_alarm
 from hmcs.task import Task
 
 Array = NDArray[np.float64]
@@ -54,10 +54,13 @@ def learn_layers(
     scores = np.concatenate([t.scores for t in tracks])
     lowest = float(np.quantile(scores, settings.background_quantile))
     scoring = scoring._replace(background=lowest - scoring.temperature)
-    threshold = _alarm_threshold(held_out, scoring, axes, task, settings)
-    return Layers(
-        parameters, scoring, settings.filter, AlarmSettings(settings.alarm_window_steps, threshold)
-    )
+    width = settings.alarm_window_steps
+    if settings.unknown_rise:
+        level = learn_alarm(_fits(held_out, scoring, axes, task, settings), width).threshold
+        rise = scoring.temperature * settings.unknown_rise * max(level, 0.0)
+        scoring = scoring._replace(background=scoring.background + rise)
+    alarm = learn_alarm(_fits(held_out, scoring, axes, task, settings), width)
+    return Layers(parameters, scoring, settings.filter, alarm)
 
 
 def check_layers(layers: Layers, task: Task) -> None:
@@ -101,14 +104,25 @@ class _HeldOut(NamedTuple):
 def _held_out(
     by_gesteme: Sequence[Sequence[Segment]], axes: Sequence[int], settings: LearningSettings
 ) -> list[_HeldOut]:
-    """Leave out one segment of each gesteme in turn; with one demonstration, leave out none."""
-    rounds = max(len(own) for own in by_gesteme)
+    """Leave out in turn all that one demonstration shows of a gesteme.
+
+    With one demonstration of a gesteme nothing of it is left out.
+    """
+    shown = [_by_demonstration(own) for own in by_gesteme]
     result = []
-    for r in range(rounds):
-        kept = [[s for k, s in enumerate(own) if len(own) == 1 or k != r] for own in by_gesteme]
-        left = tuple(own[r] for own in by_gesteme if r < len(own))
+    for r in range(max(len(groups) for groups in shown)):
+        kept = [
+            [s for k, group in enumerate(groups) if len(groups) == 1 or k != r for s in group]
+            for groups in shown
+        ]
+        left = tuple(s for groups in shown if r < len(groups) for s in groups[r])
         result.append(_HeldOut(fit_gestemes(kept, axes, settings), left))
     return result
+
+
+def _by_demonstration(segments: Sequence[Segment]) -> list[list[Segment]]:
+    names = dict.fromkeys(segment.demonstration for segment in segments)
+    return [[s for s in segments if s.demonstration == name] for name in names]
 
 
 class _Track(NamedTuple):
@@ -133,22 +147,25 @@ def _track(
     return _Track(np.array(scores), np.array(exits))
 
 
-def _alarm_threshold(
+def _fits(
     held_out: Sequence[_HeldOut],
     scoring: Scoring,
     axes: Sequence[int],
     task: Task,
     settings: LearningSettings,
-) -> float:
-    means: list[float] = []
+) -> list[Array]:
+    """How well each performance of segments left out fits the task, (T,) each; see `unknown`."""
+    result = []
     for fold in held_out:
         bank = GestemeBank(fold.parameters, scoring, axes, range(len(task.gestemes)))
         task_filter = SegmentFilter(chain_of(task, anywhere=True), settings.filter)
-        steps = steps_of(_performed(_in_task_order(task, fold.segments)), task.dead_zone_m)
-        scores = [task_filter.step(bank.step(step)).log_likelihood for step in steps]
-        width = min(settings.alarm_window_steps, len(scores))
-        means.extend(np.convolve(scores, np.full(width, 1.0 / width), mode="valid"))
-    return float(np.quantile(means, settings.alarm_quantile))
+        beliefs = [
+            task_filter.step(bank.step(step))
+            for step in _performed(_in_task_order(task, fold.segments))
+        ]
+        told = np.array([(belief.log_likelihood, belief.unknown) for belief in beliefs])
+        result.append(fit_of(told[:, 0], told[:, 1]))
+    return result
 
 
 def _in_task_order(task: Task, segments: Sequence[Segment]) -> list[Segment]:
@@ -160,16 +177,15 @@ def _in_task_order(task: Task, segments: Sequence[Segment]) -> list[Segment]:
         order.append(here)
         following = states[here].next
         here = max(following, key=following.__getitem__) if following else None
-    rank = {name: k for k, state in enumerate(order) for name in states[state].gestemes}
-    names = [gesteme.name for gesteme in task.gestemes]
-    return sorted(segments, key=lambda segment: rank.get(names[segment.gesteme], len(order)))
+    rank = {name: k for k, name in enumerate(order)}
+    names = [state.name for state in task.states]
+    return sorted(segments, key=lambda segment: rank.get(names[segment.state], len(order)))
 
 
-def _performed(segments: Sequence[Segment]) -> Array:
-    """Positions, m, shape (T, 3), of one hand that performs all segments one after another."""
-    here = np.zeros(3)
-    pieces = []
-    for segment in segments:
-        pieces.append(here + segment.positions - segment.positions[0])
-        here = pieces[-1][-1]
-    return np.concatenate(pieces)
+def _performed(segments: Sequence[Segment]) -> list[Step]:
+    """The steps of one hand that performs all segments one after another."""
+    here, steps = np.zeros(3), list[Step]()
+    for step in (step for segment in segments for step in segment.steps):
+        steps.append(step._replace(index=len(steps), position=here))
+        here = here + step.displacement
+    return steps

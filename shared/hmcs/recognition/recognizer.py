@@ -19,7 +19,7 @@ class Recognition(NamedTuple):
 
     belief: TaskBelief
     mean_log_likelihood: float
-    """Mean of the belief's log-likelihoods over the alarm window, nats."""
+    """How well the last steps fit the task: mean over the alarm window, nats."""
     unknown_alarm: bool
     """True where that mean is below the model's threshold."""
 

@@ -79,8 +79,11 @@ def test_evidence_equals_the_forward_algorithm_of_each_gesteme_hmm(model, steps,
         assert exits == pytest.approx(leaving[k - 1] if k else 0.0, abs=1e-9)
         before = totals[k - 1] if k else 0.0
         expected = (totals[k] - before - lenient.background) / lenient.temperature
-        if np.isfinite(expected) and expected > -50:
-            assert log_ratio == pytest.approx(expected, rel=1e-7, abs=1e-7)
+        if expected < -50:
+            # Long since pruned in use; from here on densities are too small for either.
+            assert log_ratio < -40
+            break
+        assert log_ratio == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
 def test_evidence_does_not_depend_on_what_else_is_held(model, steps):

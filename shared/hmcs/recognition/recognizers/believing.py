@@ -21,7 +21,7 @@ class Believer:
     """Says what is believed by a method that knows neither unknown motion nor an alarm."""
 
     def __init__(self) -> None:
-        self._mean = UnknownAlarm(AlarmSettings(MEAN_STEPS, -math.inf))
+        self._mean = UnknownAlarm(AlarmSettings(MEAN_STEPS, -math.inf, -math.inf))
         self._state: int | None = None
         self._since = 0
 
@@ -51,4 +51,4 @@ class Believer:
             log_likelihood=log_likelihood,
             missing=(),
         )
-        return Recognition(belief, *self._mean.step(log_likelihood))
+        return Recognition(belief, *self._mean.step(log_likelihood, 0.0))
