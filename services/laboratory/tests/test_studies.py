@@ -13,11 +13,16 @@ SHARES = {
     "boundary_f",
     "gestemes_right",
     "states_right",
+    "exact",
+    "direction_accuracy",
 }
 MEASURES = {
     *SHARES,
     "adjusted_rand",
     "gesteme_adjusted_rand",
+    "found",
+    "true",
+    "delay_median_steps",
     "delay_p95_steps",
     "false_switches_per_1000",
     *TIMINGS,

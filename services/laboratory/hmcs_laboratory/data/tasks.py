@@ -98,6 +98,12 @@ def sequential_task(
     return plain_task(name, states, ["S1"], dead_zone_m=dead_zone_m, dimensions=dimensions)
 
 
+def path_of(steps: Sequence[Step]) -> Array:
+    """Return where the hand was before each step and after the last, m, shape (T + 1, 3)."""
+    ends = [step.position + step.displacement for step in steps]
+    return np.array([steps[0].position, *ends])
+
+
 def as_performance(demonstration: Demonstration, task: Task) -> Performance:
     """Return the steps of a labeled demonstration with the true state of each."""
     zone, steps, ends, here = DeadZone(task.dead_zone_m), [], [], 0

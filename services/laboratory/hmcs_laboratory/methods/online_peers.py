@@ -21,7 +21,7 @@ from hmcs.recognition.scoring import NONE
 from hmcs.recognition.segment_filter import TaskBelief
 from hmcs.recognition.segments import segments_of
 from hmcs.task import Task
-from hmcs_laboratory.data.tasks import as_performance
+from hmcs_laboratory.data.tasks import as_performance, path_of
 from hmcs_laboratory.methods.features import directions
 from hmcs_laboratory.methods.online import Fresh
 from hmcs_laboratory.methods.windows import FROM_START, LONG, Window, fit_window_trees
@@ -98,7 +98,7 @@ def _learned_trees(
 ) -> Fresh:
     axes = list(axes_of(task))
     made = [as_performance(demonstration, task) for demonstration in demonstrations]
-    paths = [_path(each.steps)[:, axes] for each in made]
+    paths = [path_of(each.steps)[:, axes] for each in made]
     windows = np.concatenate([window.features(path, path[0]) for path in paths])
     states = np.concatenate([each.states for each in made])
     labeled = states != NONE
@@ -114,7 +114,7 @@ def learn_concatenated_hmm(
     names = [gesteme.name for gesteme in task.gestemes]
     sequences: list[list[Array]] = [[] for _ in names]
     for segment in segments_of(task, demonstrations):
-        sequences[segment.gesteme].append(directions(_path(segment.steps)[:, axes]))
+        sequences[segment.gesteme].append(directions(path_of(segment.steps)[:, axes]))
     of_gesteme = [_gesteme_model(own) for own in sequences]
     own = [of_gesteme[names.index(state.gestemes[0])] for state in task.states]
     initial, transition = _joined(task, own)
@@ -138,12 +138,6 @@ def recognition(index: int, states: Array, task: Task, log_likelihood: float = 0
         missing=(),
     )
     return Recognition(belief, log_likelihood, False)
-
-
-def _path(steps: Sequence[Step]) -> Array:
-    """Where the hand was before each step and after the last, m, shape (T + 1, 3)."""
-    ends = [step.position + step.displacement for step in steps]
-    return np.array([steps[0].position, *ends])
 
 
 def _gesteme_model(sequences: Sequence[Array]) -> Hmm[Gaussian]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hmcs_laboratory.studies.directions import DIRECTIONS
 from hmcs_laboratory.studies.drawings import LASA
 from hmcs_laboratory.studies.gestemes import (
     GESTEME_COUNT,
@@ -29,4 +30,5 @@ STUDIES: tuple[Study[Any], ...] = (
     LASA,
     LASA_TASKS,
     UNLABELED,
+    DIRECTIONS,
 )

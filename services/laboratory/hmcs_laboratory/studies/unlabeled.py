@@ -29,6 +29,7 @@ from hmcs.recognition.unlabeled import UnlabeledSettings, discover, labeled
 from hmcs.task import Task, load_task
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
+from hmcs_laboratory.data.tasks import path_of
 from hmcs_laboratory.study import Measured, Scalar, Study
 
 Array = NDArray[np.float64]
@@ -203,12 +204,7 @@ def _kmeans(truth: _Truth, rng: np.random.Generator) -> _Found:
 
 def _stepped(truth: _Truth) -> list[Array]:
     axes = list(axes_of(truth.task))
-    return [
-        np.array([*(step.position for step in steps), steps[-1].position + steps[-1].displacement])[
-            :, axes
-        ]
-        for steps, _, _ in truth.steps
-    ]
+    return [path_of(steps)[:, axes] for steps, _, _ in truth.steps]
 
 
 _METHODS: Mapping[Name, Callable[[_Truth, np.random.Generator], _Found]] = {
