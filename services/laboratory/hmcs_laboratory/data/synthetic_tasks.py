@@ -69,6 +69,34 @@ def six_segments(
     )
 
 
+def of_other_sizes(
+    data: TaskSet,
+    settings: TaskSettings,
+    noise: float,
+    size: float,
+    turn_rad: float,
+    rng: np.random.Generator,
+) -> TaskSet:
+    """Return a sequential task performed in other sizes and turns than it was learned in.
+
+    Each segment is scaled by a factor of its own in 1 ± size and turned about its beginning by an
+    angle of its own in ± turn, in space about a random axis. The demonstrations are those of
+    `data`.
+    """
+    states = [state.name for state in data.task.states]
+    performances = []
+    for k in range(settings.performances):
+        curves = {
+            state.name: _similar(
+                data.references[state.gestemes[0]], settings.dimensions, size, turn_rad, rng
+            )
+            for state in data.task.states
+        }
+        made = _demonstrated(f"other-{k}", states, curves, states, settings, noise, rng)
+        performances.append(as_performance(made, data.task))
+    return data._replace(performances=tuple(performances))
+
+
 def line_task(
     settings: TaskSettings, lines: int, noise: float, rng: np.random.Generator
 ) -> TaskSet:
@@ -91,6 +119,20 @@ def random_curves(
         curves = {name: random_gesteme(kind, rng) for name, kind in kinds.items()}
         if all(turn_rad(curves[a], curves[b]) >= kinds[b].least_turn_rad for a, b in pairs):
             return curves
+
+
+def _similar(
+    points: Array, dimensions: int, size: float, turn_rad: float, rng: np.random.Generator
+) -> Array:
+    factor, angle = rng.uniform(1.0 - size, 1.0 + size), rng.uniform(-turn_rad, turn_rad)
+    axis = np.array([0.0, 0.0, 1.0])
+    if dimensions == 3:
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+    # Rodrigues' formula.
+    across = np.cross(axis, points)
+    turned = points + np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)
+    return np.asarray(factor * turned)
 
 
 def _performed_task(

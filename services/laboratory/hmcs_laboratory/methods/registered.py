@@ -36,7 +36,15 @@ WHOLE = (
 )
 """Methods that classify a whole gesteme."""
 
-RECOGNIZERS = (recognizer("segment-filter", "hmcs.recognition.segment_filter"),)
+RECOGNIZERS = (
+    recognizer("segment-filter", "hmcs.recognition.segment_filter"),
+    recognizer(
+        "segment-filter",
+        "the same, each gesteme aligned in size and turn while it is performed",
+        {"alignment_sigma": "0.16"},
+        variant="aligned",
+    ),
+)
 """Our recognizers that follow a task."""
 
 ONLINE_PEERS = (

@@ -13,6 +13,7 @@ from hmcs_laboratory.studies.gestemes import (
     PEERS,
     TRAINING_COUNT,
 )
+from hmcs_laboratory.studies.scale import SCALE
 from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
 from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
 from hmcs_laboratory.studies.unlabeled import UNLABELED
@@ -27,6 +28,7 @@ STUDIES: tuple[Study[Any], ...] = (
     PARTIAL,
     RESTART,
     ORDER,
+    SCALE,
     LASA,
     LASA_TASKS,
     UNLABELED,
