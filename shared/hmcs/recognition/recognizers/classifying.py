@@ -33,6 +33,7 @@ from hmcs.recognition.recognizers.restarting import (
     Restart,
     gesteme_level,
 )
+from hmcs.recognition.symbols import Bins
 from hmcs.task import Task
 
 
@@ -48,8 +49,10 @@ def learn_gestemes(
     observed: Observed,
     observation_settings: ObservationSettings,
     hmm_settings: GestemeHmmSettings,
+    *,
+    complete: bool,
 ) -> Gestemes:
-    """Return what labeled segments tell of the gestemes."""
+    """Return what labeled segments tell of the gestemes; `complete` as `learn_gesteme_hmms`."""
     axes = axes_of(lesson.task)
     observing = learn_observing(
         [segment.steps for segment in lesson.segments],
@@ -63,26 +66,28 @@ def learn_gestemes(
         for g in range(len(lesson.task.gestemes))
     ]
     lesson.progress(f"gesteme HMMs on {observed} observations")
-    return Gestemes(observing, learn_gesteme_hmms(by_gesteme, observing.symbols, hmm_settings))
+    hmms = learn_gesteme_hmms(by_gesteme, observing.symbols, hmm_settings, complete=complete)
+    return Gestemes(observing, hmms)
 
 
 def check_gestemes(gestemes: Gestemes, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task."""
     check_gesteme_hmms(gestemes.hmms, len(task.gestemes))
-    observing, emissions = gestemes.observing, gestemes.hmms.emissions
-    if observing.window_steps < 1 or observing.hop_steps < 1 or observing.bins < 0:
-        raise ValueError("windows of no length, or bins below 0")
-    axes = len(axes_of(task))
-    dimensions = axes * observing.window_steps
-    features = {observing.codebook.shape[1:], observing.lower.shape, observing.upper.shape}
-    if features != {(dimensions,)}:
-        raise ValueError(f"observations of shapes {features}, expected ({dimensions},)")
-    expected: tuple[int, ...] = (dimensions,)
-    if not isinstance(emissions, Normals):
-        expected = (1 if len(observing.codebook) else dimensions, observing.symbols or 0)
-    emitted = emissions[0].shape[2:]
-    if emitted != expected:
-        raise ValueError(f"gesteme HMMs emit {emitted}, but {expected} is observed")
+    fourier, encoding = gestemes.observing
+    features = len(axes_of(task))
+    if fourier is not None and fourier.kept == "complex":
+        features *= fourier.window_steps
+    elif fourier is not None:
+        features *= fourier.window_steps // 2 + 1
+    if encoding is not None and encoding[0].shape[-1] != features:
+        raise ValueError(f"{encoding[0].shape[-1]} features in symbols, expected {features}")
+    emissions = gestemes.hmms.emissions
+    expected: tuple[int, ...] = (features,)
+    if encoding is not None:
+        dimensions = features if isinstance(encoding, Bins) else 1
+        expected = (dimensions, gestemes.observing.symbols or 0)
+    if emissions[0].shape[2:] != expected or isinstance(emissions, Normals) != (encoding is None):
+        raise ValueError(f"gesteme HMMs emit {emissions[0].shape[2:]}, but {expected} is observed")
 
 
 class GestemeClassifier:

@@ -35,6 +35,11 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+_LEAST_LOG_LENGTH = 0.1
+_LEAST_FORCE = 1e-3
+"""N or N·m; a sensor that varies less is constant, and in its own unit."""
+
+
 class NetworkSettings(NamedTuple):
     """How a network of gesteme HMMs is learned."""
 
@@ -55,7 +60,7 @@ class NetworkKnowledge(NamedTuple):
     """P(gesteme over after a step | its last state), shape (M,)."""
     scales: Array
     """Unit in which each dimension is observed, shape (F,): 1 for directions, for the others their
-    standard deviation over all demonstrations."""
+    standard deviation over all demonstrations, 0.1 at least for the log of the length."""
     off_network: float
 
 
@@ -97,12 +102,15 @@ def learn_network(
     """Return what is learned from segments that cover all gestemes."""
     forced = all(step.wrench is not None for segment in segments for step in segment.steps)
     observed = [observations(segment.steps, axes, dead_zone_m, forced) for segment in segments]
-    scales = np.maximum(np.concatenate(observed).std(axis=0), 1e-6)
+    scales = np.concatenate(observed).std(axis=0)
     scales[: len(axes)] = 1.0
+    # What hardly varies is no more telling for that.
+    scales[len(axes)] = max(scales[len(axes)], _LEAST_LOG_LENGTH)
+    scales[scales < _LEAST_FORCE] = 1.0
     by_gesteme: list[list[Array]] = [[] for _ in range(gestemes)]
     for segment, seen in zip(segments, observed, strict=True):
         by_gesteme[segment.gesteme].append(seen / scales)
-    hmms = learn_gesteme_hmms(by_gesteme, None, settings.gestemes)
+    hmms = learn_gesteme_hmms(by_gesteme, None, settings.gestemes, complete=True)
     lengths = [float(np.mean([len(seen) for seen in own])) for own in by_gesteme]
     return NetworkKnowledge(hmms, _leaving(hmms, lengths), scales, settings.off_network)
 

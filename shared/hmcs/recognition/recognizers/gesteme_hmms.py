@@ -28,7 +28,9 @@ class GestemeHmmSettings(NamedTuple):
 
     states: int = 5
     """N of each gesteme. A gesteme whose shortest demonstration makes fewer observations has only
-    as many, so that each of its states is passed in each demonstration."""
+    as many, so that each of its states can be passed in each demonstration; only half as many
+    where a gesteme is over once its last state was reached, so that it may be performed in half
+    the steps, too."""
     emission_floor: float = 0.01
     """No symbol is less probable than this in any state, or than a tenth of an even share of all
     symbols if that is less. The thesis has none; it matters more than any other choice."""
@@ -62,18 +64,26 @@ class GestemeHmms(NamedTuple):
 
 
 def learn_gesteme_hmms(
-    by_gesteme: Sequence[Sequence[Observations]], symbols: int | None, settings: GestemeHmmSettings
+    by_gesteme: Sequence[Sequence[Observations]],
+    symbols: int | None,
+    settings: GestemeHmmSettings,
+    *,
+    complete: bool,
 ) -> GestemeHmms:
     """Return the HMM of each gesteme from its observation sequences.
 
     With `symbols` they are integers below it, shape (T, D); without, vectors, shape (T, F).
-    Learning starts from states of equal duration.
+    Learning starts from states of equal duration. With `complete` every sequence is known to end
+    in the last state, as it must where the last state says that the gesteme is over.
     """
-    models: list[Hmm[Any]] = [_started(own, symbols, settings) for own in by_gesteme]
+    models: list[Hmm[Any]] = [_started(own, symbols, settings, complete) for own in by_gesteme]
     for count in {len(model.initial) for model in models} - {1}:
         alike = [m for m, model in enumerate(models) if len(model.initial) == count]
         improved = _improved(
-            [models[m] for m in alike], [by_gesteme[m] for m in alike], settings.iterations
+            [models[m] for m in alike],
+            [by_gesteme[m] for m in alike],
+            settings.iterations,
+            complete=complete,
         )
         for m, model in zip(alike, improved, strict=True):
             models[m] = model
@@ -130,11 +140,14 @@ def check_gesteme_hmms(hmms: GestemeHmms, gestemes: int) -> None:
 
 
 def _started(
-    sequences: Sequence[Observations], symbols: int | None, settings: GestemeHmmSettings
+    sequences: Sequence[Observations],
+    symbols: int | None,
+    settings: GestemeHmmSettings,
+    complete: bool,
 ) -> Hmm[Any]:
     """States of equal duration, and what is observed in them."""
     lengths = [len(sequence) for sequence in sequences]
-    count = min(settings.states, *lengths)
+    count = min(settings.states, max(1, min(lengths) // (2 if complete else 1)))
     if symbols is None and (np.concatenate(sequences) == sequences[0][0]).all():
         # States that emit the same are one, and no variance can be learned of them.
         count = 1
@@ -168,16 +181,21 @@ def _emission(
 
 
 def _improved(
-    models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations]], iterations: int
+    models: Sequence[Hmm[Any]],
+    sequences: Sequence[Sequence[Observations]],
+    iterations: int,
+    *,
+    complete: bool,
 ) -> list[Hmm[Any]]:
     emission = models[0].emission
-    if isinstance(emission, MultiDiscrete):
-        return [
-            baum_welch(model, own, max_iterations=iterations).model
-            for model, own in zip(models, sequences, strict=True)
-        ]
     if isinstance(emission, Discrete):
         sequences = [[sequence[:, 0] for sequence in own] for own in sequences]
+    if complete or isinstance(emission, MultiDiscrete):
+        end = [len(models[0].initial) - 1] if complete else None
+        return [
+            baum_welch(model, own, max_iterations=iterations, end_states=end).model
+            for model, own in zip(models, sequences, strict=True)
+        ]
     return [each.model for each in baum_welch_many(models, sequences, max_iterations=iterations)]
 
 

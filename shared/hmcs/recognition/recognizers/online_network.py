@@ -76,7 +76,9 @@ def state_given_gesteme(chain: TaskChain, gestemes: int) -> Array:
 
 def _learn(lesson: Lesson) -> Gestemes:
     settings: OnlineNetworkSettings = lesson.settings
-    return learn_gestemes(lesson, settings.observations, settings.observing, settings.gestemes)
+    return learn_gestemes(
+        lesson, settings.observations, settings.observing, settings.gestemes, complete=True
+    )
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:

@@ -34,9 +34,9 @@ class GestemeChains(NamedTuple):
 class CusumSettings(NamedTuple):
     """The CUSUM test (2.21–2.22) of the likelihood of the most probable gesteme (4.2.1)."""
 
-    drift_nats: float = 1.0
+    drift_nats: float = 0.5
     """ν: an observation may be so much less likely than their mean before it counts."""
-    threshold_nats: float = 5.0
+    threshold_nats: float = 1.5
     """h: a change is found when what counts adds up to more than this."""
 
 

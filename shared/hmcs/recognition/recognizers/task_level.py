@@ -26,7 +26,7 @@ class TaskLevelSettings(NamedTuple):
 
     emission_floor: float = 0.01
     """No gesteme is less probable than this in any task state."""
-    any_state: float = 1e-3
+    any_state: float = 1e-5
     """In each step the task goes to any state whatever with this probability, so that orders never
     trained stay possible."""
     iterations: int = 20

@@ -72,7 +72,13 @@ def learn_two_levels(lesson: Lesson, settings: TwoLevelSettings) -> TwoLevels:
     they will be, so that it expects their mistakes; where restarts are given, at the labels.
     """
     task = lesson.task
-    gestemes = learn_gestemes(lesson, settings.observations, settings.observing, settings.gestemes)
+    gestemes = learn_gestemes(
+        lesson,
+        settings.observations,
+        settings.observing,
+        settings.gestemes,
+        complete=settings.restart == "network",
+    )
     told = []
     for demonstration in lesson.demonstrations:
         labeled = labeled_steps(task, demonstration)
