@@ -24,7 +24,7 @@ from hmcs.bus.wire import decode, encode
 from hmcs.fixtures.controller import Controller, Safeguards
 from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step as MotionStep
-from hmcs.recognition.layered import TaskRecognizer
+from hmcs.recognition.layered import TaskRecognizer, bank_of
 from hmcs.recognition.model_file import load_model
 from hmcs_fixture_controller.translation import command_of, sample_of, state_of
 from hmcs_input_device.playback import Passes, Playback
@@ -72,7 +72,7 @@ def fixture(to: int) -> None:
 def classifier(to: int, path: Path) -> None:
     """Make Evidence of each Step, for all gestemes of a model."""
     model = load_model(path)
-    bank = model.bank()
+    bank = bank_of(model)
     server, port = listen()
     print(port, flush=True)
     with connect(to) as following, accept(server) as before:
