@@ -25,10 +25,13 @@ class FourierSettings(NamedTuple):
     """The choices of the recognizer on Fourier features."""
 
     observing: ObservationSettings = ObservationSettings()
+    """Numbers of symbols, and the windows."""
     gestemes: GestemeHmmSettings = GestemeHmmSettings()
+    """How gesteme HMMs are learned."""
     evidence: Evidence = "winner"
     """What the task HMM is shown: the most probable gesteme or all with their probabilities."""
     task: TaskLevelSettings = TaskLevelSettings()
+    """How the task HMM is learned."""
 
 
 def _learn(lesson: Lesson) -> TwoLevels:

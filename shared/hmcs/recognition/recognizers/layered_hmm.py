@@ -27,16 +27,20 @@ class LayeredHmmSettings(NamedTuple):
     observations: Observed = "od"
     """What the gesteme HMMs observe; see there."""
     observing: ObservationSettings = ObservationSettings()
+    """Numbers of symbols, and the windows."""
     gestemes: GestemeHmmSettings = GestemeHmmSettings()
+    """How gesteme HMMs are learned."""
     restart: Restart = "network"
     """When the gesteme HMMs begin anew: where the pedal says (given: as the thesis evaluates
     them), by the CUSUM test, all the time in a network as Li and Okamura's, or never. The default
     asks nothing of the operator."""
     cusum: CusumSettings = CusumSettings()
+    """The test, where restarts are found by it."""
     evidence: Evidence = "winner"
     """What the task HMM is shown: the most probable gesteme, as in the thesis, or all of them with
     their probabilities (soft), which halves the false switches."""
     task: TaskLevelSettings = TaskLevelSettings()
+    """How the task HMM is learned."""
 
 
 def _learn(lesson: Lesson) -> TwoLevels:

@@ -33,7 +33,9 @@ class OnlineNetworkSettings(NamedTuple):
     observations: Observed = "direction"
     """What the gesteme HMMs observe; the paper's HMMs are continuous."""
     observing: ObservationSettings = ObservationSettings()
+    """Numbers of symbols, and the windows."""
     gestemes: GestemeHmmSettings = GestemeHmmSettings()
+    """How gesteme HMMs are learned."""
 
 
 class OnlineNetwork:

@@ -35,7 +35,8 @@ class CusumSettings(NamedTuple):
     """The CUSUM test (2.21–2.22) of the likelihood of the most probable gesteme (4.2.1)."""
 
     drift_nats: float = 0.5
-    """ν: an observation may be so much less likely than their mean before it counts."""
+    """ν: an observation may be so much less likely than the mean since the restart before it
+    counts."""
     threshold_nats: float = 1.5
     """h: a change is found when what counts adds up to more than this."""
 

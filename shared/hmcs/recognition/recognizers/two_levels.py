@@ -47,12 +47,19 @@ class TwoLevelSettings(NamedTuple):
     """How the two levels are learned, and how they work together."""
 
     observations: Observed
+    """What the gesteme HMMs observe."""
     observing: ObservationSettings
+    """Numbers of symbols, and the windows."""
     gestemes: GestemeHmmSettings
+    """How gesteme HMMs are learned."""
     restart: Restart
+    """When gesteme HMMs begin anew."""
     cusum: CusumSettings
+    """The test, where restarts are found by it."""
     evidence: Evidence
+    """What the task HMM is shown: the most probable gesteme, or all with their probabilities."""
     task: TaskLevelSettings
+    """How the task HMM is learned."""
 
 
 class TwoLevels(NamedTuple):
