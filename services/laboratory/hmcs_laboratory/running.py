@@ -22,7 +22,7 @@ Progress = Callable[[int], None]
 """Called with the number of trials done so far."""
 
 _PACKAGES = ("hmcs", "hmcs-laboratory", "numpy", "scipy", "scikit-learn", "joblib")
-_PEERS = ("hmmlearn", "aeon", "tslearn")
+_PEERS = ("hmmlearn", "aeon")
 
 
 class StudyResult(NamedTuple):

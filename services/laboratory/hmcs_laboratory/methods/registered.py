@@ -44,6 +44,28 @@ RECOGNIZERS = (
         {"alignment_sigma": "0.16"},
         variant="aligned",
     ),
+    *(
+        recognizer(
+            "lhmm",
+            f"Aarno 2007, chapter 4: restart {restart}, {evidence} evidence",
+            {"restart": restart, "evidence": evidence},
+            variant=f"{restart}-{evidence}",
+            marked=restart == "given",
+        )
+        for restart, evidence in (
+            ("given", "winner"),
+            ("given", "soft"),
+            ("never", "winner"),
+            ("cusum", "winner"),
+            ("network", "winner"),
+            ("network", "soft"),
+        )
+    ),
+    recognizer("online-network", "Li & Okamura 2003"),
+    recognizer("gesteme-network", "Hundtofte et al. 2002, online"),
+    recognizer("fourier", "Yu et al. 2005"),
+    recognizer("directions-svm", "Aarno 2007, chapter 3"),
+    recognizer("task-hmm", "Hannaford & Lee 1990"),
 )
 """Our recognizers that follow a task."""
 
