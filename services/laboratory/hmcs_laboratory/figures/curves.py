@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -19,7 +20,6 @@ from hmcs_laboratory.figures.drawing import (
     METHOD_MARKS,
     Drawn,
     Number,
-    listed,
     new_picture,
 )
 from hmcs_laboratory.study import StudySettings
@@ -30,6 +30,8 @@ Kind = Literal["line", "circle", "mixed"]
 OURS = "hmcs-gestemes"
 FLOORED = ("od-hmm", "md-hmm", "fft-hmm")
 UNFLOORED = tuple(f"{name}-no-floor" for name in FLOORED)
+ALIKE = 0.02
+"""Methods whose mean shares differ by less are told to be alike."""
 NAMES = {"od-hmm": "OD", "md-hmm": "MD", "fft-hmm": "FFT", OURS: "ours"}
 
 
@@ -302,20 +304,29 @@ def _drawn(
         for value in ends
     ]
     overall = {
-        method: np.mean([curves[kind, method][v].mean for kind in settings.kinds for v in values])
+        method: float(
+            np.mean([curves[kind, method][v].mean for kind in settings.kinds for v in values])
+        )
         for method in FLOORED
     }
     order = sorted(FLOORED, key=lambda method: -overall[method])
-    best = f"Over all settings drawn the order is {listed([NAMES[name] for name in order])}."
+    ranked = NAMES[order[0]]
+    for better, worse in pairwise(order):
+        alike = overall[better] - overall[worse] < ALIKE
+        ranked += f" {'≈' if alike else '>'} {NAMES[worse]}"
     found = (
         f"Shares recognized of {shown} gestemes by OD, MD and FFT, means of {settings.trials} "
         f"trials ({min(settings.unfloored_trials, settings.trials)} without the floor): "
-        f"{'; '.join(parts)}. {best} Bars are 95 % intervals."
+        f"{'; '.join(parts)}. Over all settings drawn with the floor: {ranked}. Bars are 95 % "
+        "intervals."
     )
+    numbers["mean_of_all"] = [overall[method] for method in FLOORED]
+    among_best = overall[order[0]] - overall["od-hmm"] < ALIKE
     first = (
-        "The thesis says that OD appears to be the best with noise."
-        if order[0] == "od-hmm"
-        else f"The thesis says that OD appears to be the best; here {NAMES[order[0]]} is."
+        f"The thesis says that OD appears to be the best; here {ranked}, where ≈ is a difference "
+        f"below {ALIKE:g}."
+        if among_best
+        else f"The thesis says that OD appears to be the best; here {ranked}."
     )
     return Drawn(picture, numbers, found, f"{first} {differs}".strip())
 
