@@ -18,6 +18,7 @@ from hmcs_laboratory.data.synthetic_tasks import (
     TaskSettings,
     five_states,
     line_task,
+    of_other_sizes,
     six_segments,
 )
 
@@ -71,6 +72,25 @@ def test_five_states_come_in_turn_with_one_arc_twice():
         assert len(performance.states) == len(performance.steps)
     for before, after in pairwise(FIVE_STATES):
         assert turn_rad(data.references[before], data.references[after]) >= np.pi / 6
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_of_other_sizes_and_turns_each_segment_keeps_its_own_within_bounds(dimensions):
+    settings = TaskSettings(demonstrations=1, performances=12, dimensions=dimensions)
+    rng = np.random.default_rng(5)
+    data = five_states(settings, 0.0, rng)
+    other = of_other_sizes(data, settings, 0.0, 0.5, np.radians(15.0), rng)
+    assert other.demonstrations is data.demonstrations
+    line = data.references["l1"][-1]
+    length = np.linalg.norm(line)
+    factors, cosines = [], []
+    for performance in other.performances:
+        first = np.array([s.displacement for s in performance.steps])[performance.states == 0]
+        factors.append(len(first) * settings.step_m / length)
+        cosines.append(first[0] @ line / np.linalg.norm(first[0]) / length)
+    slack = 4 * settings.step_m / length
+    assert 0.5 - slack <= min(factors) < 0.9 < 1.1 < max(factors) <= 1.5 + slack
+    assert np.cos(np.radians(15.0)) - 1e-9 <= min(cosines) < np.cos(np.radians(5.0))
 
 
 def test_steps_are_the_samples_of_the_hand_or_made_by_the_dead_zone():

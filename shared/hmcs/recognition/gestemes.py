@@ -139,6 +139,11 @@ class GestemeBank:
         """What the exit of each living pair was judged by after the last step, shape (p, 10)."""
         return self._exit_features
 
+    @property
+    def similarity(self) -> alignment.Similarity:
+        """In what size and turn each living pair is performed; of no pair without an alignment."""
+        return self._similarity
+
     def step(self, step: Step) -> StepEvidence:
         """Score the next step; steps come in order, without gaps."""
         index = step.index

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.operators import joined
 from hmcs.motion.references import References, random_gesteme, random_gestemes, turn_rad
+from hmcs.recognition.segments import LearningError, segments_of
 from hmcs_laboratory.data.hands import Count, CurveSettings, Positive, moved
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task
 
@@ -22,6 +23,10 @@ TRAINED_ORDER = ("l1", "l2", "c1", "l2", "c1", "l1")
 """Fig. 4.16."""
 UNSEEN_ORDER = ("l1", "l2", "c1", "l1", "c1", "l2")
 """Fig. 4.17."""
+
+_DRAWS = 10
+"""An arc that almost closes is cut short by some hands, which then show nothing to learn: other
+curves are drawn, so often at most."""
 
 
 class TaskSettings(CurveSettings):
@@ -148,7 +153,16 @@ def _performed_task(
         ).references
         for gesteme in orders[0]
     }
-    return _performances(name, settings, orders[0], random_curves(kinds, orders, rng), noise, rng)
+    for _ in range(_DRAWS):
+        curves = random_curves(kinds, orders, rng)
+        made = _performances(name, settings, orders[0], curves, noise, rng)
+        try:
+            segments_of(made.task, made.demonstrations)
+        except LearningError as error:
+            cut_short = error
+        else:
+            return made
+    raise cut_short
 
 
 def _performances(
