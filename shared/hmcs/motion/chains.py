@@ -70,4 +70,4 @@ def _in_turn(sense: str, demonstrations: Sequence[Demonstration]) -> FloatArray 
             f"{lacking.name}: has no {sense}, but others in the chain have: record them in all, or "
             "leave their columns out of all"
         )
-    return np.concatenate([*(samples[:-1] for samples in there[:-1]), there[-1]])
+    return np.asarray(np.concatenate([*(samples[:-1] for samples in there[:-1]), there[-1]]))

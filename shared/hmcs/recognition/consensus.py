@@ -107,7 +107,7 @@ def consensus(performances: Sequence[Array], step_m: float) -> Consensus:
     moved = [performance - performance[0] for performance in performances]
     path = moved[0]
     if len(moved) == 1:
-        return Consensus(path, (np.arange(float(len(path))),), 0.0, 0.0)
+        return Consensus(path, (np.arange(len(path), dtype=np.float64),), 0.0, 0.0)
     place, direction = _PLACE_STEPS * step_m, _DIRECTION
     for _ in range(_ITERATIONS):
         aligned = np.stack([between(own, _passed(own, path, place, direction)) for own in moved])

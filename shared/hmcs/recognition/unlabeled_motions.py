@@ -83,7 +83,7 @@ def rising(at: Array, last: int) -> Integers:
     # Numbers that rise by one at least are their index plus numbers that do not fall.
     index = np.arange(count)
     near = np.maximum.accumulate(np.rint(at).astype(np.int64) - index)
-    return np.clip(near, 1, last - count) + index
+    return np.asarray(np.clip(near, 1, last - count) + index)
 
 
 def common_step_m(motions: Sequence[Motion], least_m: float, most_steps: int) -> float:

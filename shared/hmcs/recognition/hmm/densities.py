@@ -133,7 +133,8 @@ class Mixture:
         flat = (states * components, dimensions)
         densities = log_gaussians(self.means.reshape(flat), self.variances.reshape(flat), vectors)
         with np.errstate(divide="ignore"):
-            return densities.reshape(len(vectors), states, components) + np.log(self.weights)
+            log_weights = np.log(self.weights)
+        return np.asarray(densities.reshape(len(vectors), states, components) + log_weights)
 
 
 def log_gaussians(means: Array, variances: Array, observations: Array) -> Array:

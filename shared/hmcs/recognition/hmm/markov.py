@@ -284,4 +284,4 @@ def _reachable(transition: Array) -> NDArray[np.bool_]:
     reached = (transition > 0) | np.eye(len(transition), dtype=bool)
     for _ in range(len(transition).bit_length()):
         reached = reached @ reached
-    return reached
+    return np.asarray(reached)

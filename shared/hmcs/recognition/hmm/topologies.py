@@ -67,7 +67,7 @@ def left_right_with_back_steps(states: int, epsilon: float, back: float) -> Arra
         )
     transition = np.diag(np.full(states - 1, epsilon), 1) + np.diag(np.full(states - 1, back), -1)
     np.fill_diagonal(transition, 1.0 - transition.sum(axis=1))
-    return transition
+    return np.asarray(transition)
 
 
 def start_in(states: int, first: int = 0) -> Array:
