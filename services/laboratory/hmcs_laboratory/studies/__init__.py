@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hmcs_laboratory.studies.calibration import CALIBRATION
 from hmcs_laboratory.studies.directions import DIRECTIONS
 from hmcs_laboratory.studies.drawings import LASA
 from hmcs_laboratory.studies.gestemes import (
@@ -16,6 +17,7 @@ from hmcs_laboratory.studies.gestemes import (
 from hmcs_laboratory.studies.scale import SCALE
 from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
 from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
+from hmcs_laboratory.studies.unknown import UNKNOWN
 from hmcs_laboratory.studies.unlabeled import UNLABELED
 from hmcs_laboratory.study import Study
 
@@ -33,4 +35,6 @@ STUDIES: tuple[Study[Any], ...] = (
     LASA_TASKS,
     UNLABELED,
     DIRECTIONS,
+    UNKNOWN,
+    CALIBRATION,
 )
