@@ -32,6 +32,7 @@ from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.segment_filter import FilterSettings
+from hmcs.recognition.senses import Senses
 from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
 from hmcs_fixture_controller.service import FixtureController
@@ -83,6 +84,7 @@ def model(name: str, length_m: float) -> Model:
                 normals=np.zeros((1, 1, 3)),
                 exit_weights=DEFAULT_WEIGHTS,
                 step_m=0.01,
+                senses=Senses((), np.zeros((1, 2, 0)), np.ones((1, 2, 0)), np.zeros(0)),
             ),
             Scoring(0.0, 1.0, 100, 30.0),
             FilterSettings(),

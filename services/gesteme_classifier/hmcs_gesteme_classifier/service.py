@@ -40,16 +40,17 @@ class GestemeClassifier(Service):
         )
         self._peers_key = bus.keys.member(self._model.name, self.name)
         self._peers = {bus.source.instance}
-        window_steps = layers_of(self._model).scoring.window_steps
+        # One more than is scored: how the hand turns in a step is told by the step before it.
+        memory_steps = layers_of(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
-        self._recent: deque[FedStep] = deque(maxlen=window_steps)
+        self._recent: deque[FedStep] = deque(maxlen=memory_steps)
         self._ready = False
         self._feed = StepFeed(
             bus,
             log,
             self._on_step,
             self._on_restart,
-            memory_steps=window_steps,
+            memory_steps=memory_steps,
         )
 
     def start(self) -> None:

@@ -46,7 +46,7 @@ class TaskHmm(Service):
             log,
             self._on_step,
             self._on_restart,
-            memory_steps=layers_of(self._model).scoring.window_steps,
+            memory_steps=layers_of(self._model).scoring.window_steps + 1,
         )
 
     def start(self) -> None:

@@ -21,6 +21,14 @@ from hmcs.recognition.hmm.learning import EMISSION, baum_welch
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.segment_filter import FilterSettings
 from hmcs.recognition.segments import Segment
+from hmcs.recognition.senses import (
+    Senses,
+    SenseWeights,
+    floors_of,
+    names_of,
+    rows_of,
+    weights_of,
+)
 from hmcs.recognition.variants import VariantSettings, split_into_variants
 
 Array = NDArray[np.float64]
@@ -46,6 +54,8 @@ class LearningSettings(NamedTuple):
     """Iterations of Baum–Welch on means and variances after the alignment by path length."""
     variants: VariantSettings = VariantSettings()
     """When demonstrations of one gesteme are so far apart that they are different motions."""
+    senses: SenseWeights = SenseWeights()
+    """Further senses, and how much each counts."""
     temperature: float = 4.0
     """See `Scoring`."""
     alignment_sigma: float = 0.0
@@ -80,6 +90,8 @@ class _Fitted(NamedTuple):
     remaining: Array
     end: Array
     normal: Array
+    sense_means: Array
+    sense_variances: Array
 
 
 def fit_gestemes(
@@ -91,9 +103,11 @@ def fit_gestemes(
     """
     motions = [[segment.motion(axes) for segment in own] for own in by_gesteme]
     split = split_into_variants([[m.positions for m in own] for own in motions], settings.variants)
-    models = [
-        (g, [motions[g][k] for k in group]) for g, groups in enumerate(split) for group in groups
-    ]
+    groups = [(g, group) for g, own in enumerate(split) for group in own]
+    models = [(g, [motions[g][k] for k in group]) for g, group in groups]
+    names = names_of([s for own in by_gesteme for s in own], settings.senses)
+    felt = [[rows_of(by_gesteme[g][k], names) for k in group] for g, group in groups]
+    sense_floor = floors_of([rows for own in felt for rows in own])
     step_m = float(np.mean([length for _, own in models for m in own for length in m.lengths]))
     observed = [[m.observations for m in own] for _, own in models]
     lengths = [float(np.mean([len(o) for o in own])) for own in observed]
@@ -121,6 +135,7 @@ def fit_gestemes(
         chain = _left_right(count, lengths[k])
         if settings.refine_iterations:
             means = _refined(means, variances, chain, observed[k], settings)
+        sensed = np.stack([_resampled(rows, count) for rows in felt[k]])
         fitted.append(
             _Fitted(
                 g,
@@ -131,13 +146,21 @@ def fit_gestemes(
                 (count - 0.5 - np.arange(count)) * lengths[k] / count,
                 np.mean([m.positions[-1] for m in own_motions], axis=0),
                 _unit(np.mean([m.passing for m in own_motions], axis=0)),
+                sensed.mean(axis=0),
+                _smoothed(sensed.var(axis=0)) + sense_floor,
             )
         )
-    return _packed(fitted, len(by_gesteme), len(axes), step_m)
+    weights = weights_of(names, settings.senses)
+    return _packed(fitted, len(by_gesteme), len(axes), step_m, names, weights)
 
 
 def _packed(
-    fitted: Sequence[_Fitted], gestemes: int, dimensions: int, step_m: float
+    fitted: Sequence[_Fitted],
+    gestemes: int,
+    dimensions: int,
+    step_m: float,
+    sense_names: tuple[str, ...],
+    sense_weights: Array,
 ) -> GestemeParameters:
     own = [[f for f in fitted if f.gesteme == g] for g in range(gestemes)]
     widest = max(sum(len(f.means) for f in variants) for variants in own)
@@ -147,6 +170,8 @@ def _packed(
     chain, remaining = np.zeros((4, *shape)), np.zeros(shape)
     variant = np.zeros(shape, dtype=np.int32)
     ends, normals = np.zeros((2, gestemes, most, dimensions))
+    sense_means = np.zeros((*shape, len(sense_weights)))
+    sense_variances = np.ones_like(sense_means)
     for g, variants in enumerate(own):
         begin = 0
         for v, f in enumerate(variants):
@@ -156,6 +181,7 @@ def _packed(
             chain[0, g, here] *= f.share
             remaining[g, here], variant[g, here] = f.remaining, v
             ends[g, v], normals[g, v] = f.end, f.normal
+            sense_means[g, here], sense_variances[g, here] = f.sense_means, f.sense_variances
             begin = here.stop
     initial, stay, advance, skip = chain
     return GestemeParameters(
@@ -171,6 +197,7 @@ def _packed(
         normals=normals,
         exit_weights=DEFAULT_WEIGHTS,
         step_m=step_m,
+        senses=Senses(sense_names, sense_means, sense_variances, sense_weights),
     )
 
 
@@ -182,7 +209,8 @@ def _resampled(observations: Array, count: int) -> Array:
     """Observations at the centers of `count` stretches of equal length, shape (count, F)."""
     given = (np.arange(len(observations)) + 0.5) / len(observations)
     wanted = (np.arange(count) + 0.5) / count
-    return np.stack([np.interp(wanted, given, column) for column in observations.T], axis=1)
+    columns = [np.interp(wanted, given, column) for column in observations.T]
+    return np.ascontiguousarray(np.array(columns).reshape(len(columns), count).T)
 
 
 def _smoothed(variance: Array, reach: int = 2) -> Array:

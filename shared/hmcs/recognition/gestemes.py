@@ -20,6 +20,8 @@ from hmcs.motion.steps import Step
 from hmcs.recognition import alignment
 from hmcs.recognition.alignment import Alignment
 from hmcs.recognition.exits import exit_features, exit_probability
+from hmcs.recognition.senses import Senses, log_densities
+from hmcs.recognition.sensors import SensorReader
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -56,6 +58,8 @@ class GestemeParameters(NamedTuple):
     """Of the exit's logistic regression, shape (10,); see `exits`."""
     step_m: float
     """Mean length of a step, m."""
+    senses: Senses
+    """What the phases expect of further senses, shapes (G, N, S)."""
 
 
 class Scoring(NamedTuple):
@@ -119,6 +123,7 @@ class GestemeBank:
                 parameters.means, parameters.variances, possible, scoring.alignment
             )
         self._similarity = alignment.as_learned(0, len(self._axes))
+        self._reader = SensorReader(parameters.senses.names, self._axes)
         self._held = np.array(sorted(held), dtype=np.int32)
         phases = parameters.means.shape[1]
         self._gesteme = np.zeros(0, dtype=np.int32)
@@ -165,6 +170,9 @@ class GestemeBank:
             log_emission = alignment.log_densities(
                 self._aligned, similarity, gesteme, where, direction
             )
+        if self._parameters.senses.names:
+            told = log_densities(self._parameters.senses, self._reader.step(step))
+            log_emission += told.take(gesteme, axis=0)
         top = log_emission.max(axis=1)
         joint = phase * np.exp(log_emission - top[:, None])
         total = np.maximum(joint.sum(axis=1), 1e-300)
@@ -198,6 +206,7 @@ class GestemeBank:
         bank = GestemeBank(
             self._parameters, self._scoring, self._axes, sorted({*keep, *fresh.held})
         )
+        bank._reader = self._reader
         mine = np.isin(self._gesteme, list(keep))
         gesteme = np.concatenate([self._gesteme[mine], fresh._gesteme])
         start = np.concatenate([self._start[mine], fresh._start])

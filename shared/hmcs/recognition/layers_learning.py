@@ -76,7 +76,7 @@ def check_layers(layers: Layers, task: Task) -> None:
         "exit_weights": DEFAULT_WEIGHTS.shape,
     }
     for field, value in p._asdict().items():
-        if field == "step_m":
+        if field in ("step_m", "senses"):
             continue
         kind = np.int32 if field == "variant" else np.float64
         wanted = expected.get(field, shape)
@@ -90,6 +90,10 @@ def check_layers(layers: Layers, task: Task) -> None:
             f"its arrays are for {shape[0]} gestemes with positive variances, "
             f"its task has {len(task.gestemes)}"
         )
+    senses = p.senses
+    wanted = (*shape, len(senses.weights))
+    if senses.means.shape != wanted or senses.variances.shape != wanted:
+        raise ValueError(f"what its senses expect is not of shape {wanted}")
     if not p.step_m > 0 or variants[0] != shape[0] or (p.variant >= variants[1]).any():
         raise ValueError("its variants or its step length are none")
 

@@ -25,7 +25,6 @@ from hmcs.recognition.recognizers.estimators import (
     learn_estimator,
     likelihoods,
 )
-from hmcs.recognition.recognizers.sensors import sensor_rows
 from hmcs.recognition.recognizers.slots import (
     SlotChain,
     SlotFilter,
@@ -34,6 +33,7 @@ from hmcs.recognition.recognizers.slots import (
     most_probable_states,
 )
 from hmcs.recognition.segments import LearningError
+from hmcs.recognition.sensors import sensor_rows
 from hmcs.recognition.svm import SvmSettings
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task

@@ -16,13 +16,6 @@ from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.recognizers import Kind, Lesson
-from hmcs.recognition.recognizers.sensors import (
-    SensorReader,
-    Sensors,
-    dimensions,
-    sensor_rows,
-    sensors_of,
-)
 from hmcs.recognition.recognizers.slots import (
     SlotChain,
     SlotFilter,
@@ -32,6 +25,13 @@ from hmcs.recognition.recognizers.slots import (
     slot_rows,
 )
 from hmcs.recognition.segments import LearningError
+from hmcs.recognition.sensors import (
+    SensorReader,
+    Sensors,
+    dimensions,
+    sensor_rows,
+    sensors_of,
+)
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 

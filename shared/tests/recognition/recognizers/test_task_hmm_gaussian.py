@@ -11,7 +11,6 @@ from hmcs.recognition.hmm import inference
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recognition.recognizers.sensors import SensorReader, Sensors, sensor_rows, turn_rad
 from hmcs.recognition.recognizers.slots import learn_slot_chain
 from hmcs.recognition.recognizers.task_hmm_gaussian import (
     TaskHmmSettings,
@@ -19,6 +18,7 @@ from hmcs.recognition.recognizers.task_hmm_gaussian import (
     slot_log_emission,
 )
 from hmcs.recognition.segments import LearningError, Segment, labeled_steps
+from hmcs.recognition.sensors import SensorReader, Sensors, sensor_rows, turn_rad
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from support.lessons import ROUND, lesson_task, performed, steps_performed
