@@ -28,7 +28,7 @@ Data = Literal["five-states", "unseen-order", "fixed-order", "any-order"]
 class CalibrationSettings(TaskSettings):
     """Of the study `calibration`."""
 
-    performances: Count = 20
+    performances: Count = 10
     """To recognize, in each trial: many, so that bins are filled."""
     data: Annotated[tuple[Data, ...], Field(min_length=1)] = (
         "five-states",
@@ -46,8 +46,8 @@ class CalibrationSettings(TaskSettings):
     """Of the task in which any shape may follow any other; drawn by lot."""
     drawings_dead_zone_m: Positive = 0.0023
     """On the tablet."""
-    methods: OnlineNames = ("hmcs-segment-filter", "concatenated-hmm", "extra-trees-window")
-    """Any that follow a task; the default ones are those whose probabilities mean to be such."""
+    methods: OnlineNames = ("hmcs-segment-filter", "concatenated-hmm")
+    """Any that follow a task; by default those whose probabilities are a filter's."""
 
 
 class Predictions(NamedTuple):
