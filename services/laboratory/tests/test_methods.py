@@ -10,8 +10,8 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from hmcs.errors import UserError
-from hmcs.motion.steps import Step
-from hmcs.recognition.gestemes import GestemeBank, Scoring
+from hmcs.recognition.single_gestemes import scores
+from hmcs.recognition.single_gestemes_learning import learn_single
 from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import CurveSettings
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
@@ -69,25 +69,14 @@ def test_vector_methods_decide_as_scikit_learn_does(data, name, classifier):
     assert decided == by_hand.tolist()
 
 
-def test_our_gestemes_score_as_the_bank_of_the_recognizer_does(data):
+def test_our_gestemes_score_as_single_gestemes_does(data):
     ours = fitted("hmcs-gestemes", data)
-    positions = data.test[1][0]
-    spatial = np.zeros((len(positions), 3))
-    spatial[:, :2] = positions
-    scoring = Scoring(background=0.0, temperature=1.0, window_steps=500, prune_nats=np.inf)
-    bank = GestemeBank(ours.parameters, scoring, (0, 1), range(FEW))
-    totals = np.zeros(FEW)
-    for t, move in enumerate(np.diff(spatial, axis=0)):
-        evidence = bank.step(Step(t, spatial[t], move))
-        first = evidence.pair_start == 0
-        # Not to have left before is part of what happened.
-        stayed = np.log1p(-evidence.exit[first])
-        totals[evidence.pair_gesteme[first]] += evidence.log_ratio[first] + stayed
-    np.testing.assert_allclose(ours.classify(positions, complete=False), totals, rtol=1e-9)
-    after = bank.step(Step(len(positions) - 1, spatial[-1], np.array([0.05, 0.0, 0.0])))
-    first = after.pair_start == 0
-    totals[after.pair_gesteme[first]] += np.log(np.maximum(after.exit[first], 1e-300))
-    np.testing.assert_allclose(ours.classify(positions, complete=True), totals, rtol=1e-9)
+    known = learn_single(data.training)
+    for positions in all_tests(data):
+        for whole in (True, False):
+            np.testing.assert_array_equal(
+                ours.classify(positions, complete=whole), scores(known, positions, whole=whole)
+            )
 
 
 def test_hmmlearn_models_score_as_hmmlearn_does(data):

@@ -14,15 +14,15 @@ from hmcs_laboratory.methods.online_peers import (
     learn_long_window_trees,
     learn_start_trees,
 )
-from hmcs_laboratory.methods.ours import fit_ours
 from hmcs_laboratory.methods.recognizers import recognizer
 from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
+from hmcs_laboratory.methods.single import fit_single
 from hmcs_laboratory.methods.symbol_hmms import SYMBOL_METHODS
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
 
 WHOLE = (
-    WholeMethod("hmcs-gestemes", "hmcs.recognition.gestemes", fit_ours),
+    WholeMethod("hmcs-gestemes", "hmcs.recognition.single_gestemes", fit_single),
     *SYMBOL_METHODS,
     WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian, prepare),
     WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on symbols", fit_symbols, prepare),

@@ -216,7 +216,7 @@ def _segment_filter(data: TaskSet, rng: np.random.Generator) -> tuple[Array, Fol
     demonstrations = [
         Demonstration(
             str(k),
-            np.arange(len(labels) + 1.0),
+            np.arange(len(labels) + 1, dtype=np.float64),
             path_of(steps),
             tuple(names[label] for label in [*labels, labels[-1]]),
         )

@@ -1,0 +1,30 @@
+"""Our recognizer of a single gesteme whose start is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.recognition.single_gestemes import SingleGestemes, scores
+from hmcs.recognition.single_gestemes_learning import learn_single
+from hmcs_laboratory.methods.whole import Examples
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Single:
+    """A closed loop and shapes, pooled."""
+
+    knowledge: SingleGestemes
+
+    def classify(self, positions: Array, *, complete: bool) -> Array:
+        """Return log P(gesteme | motion), shape (G,)."""
+        return scores(self.knowledge, positions, whole=complete)
+
+
+def fit_single(examples: Examples, _rng: np.random.Generator) -> Single:
+    """Learn from whole gestemes; beginnings are recognized by the same knowledge."""
+    return Single(learn_single(examples))
