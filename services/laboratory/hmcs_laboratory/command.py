@@ -90,6 +90,7 @@ def run_figures(
     terminal. Ctrl-C ends with 130. Raises UserError as `make_figures` does.
     """
     # Drawing takes a second to import, and studies do not need it.
+    from hmcs_laboratory.figures.drawing import counted
     from hmcs_laboratory.figures.progress import figures_shown
     from hmcs_laboratory.figures.run import PAGE, make_figures
 
@@ -102,7 +103,7 @@ def run_figures(
     except KeyboardInterrupt:
         console.print("figures: interrupted")
         return INTERRUPTED
-    print(f"{folder / PAGE}: {len(made)} figures, seed {seed}")
+    print(f"{folder / PAGE}: {counted(len(made), 'figure')}, seed {seed}")
     return 0
 
 

@@ -14,14 +14,16 @@ from hmcs_laboratory.figures.run import FINDINGS, PAGE, make, make_figures, writ
 NUMBERS = [
     *("2.5", "2.6", "2.7", "2.8", "3.2", "3.3", "3.4", "3.6", "3.7"),
     *(f"4.{number}" for number in (*range(2, 14), 16, 17)),
+    *("B.1", "B.2"),
 ]
-RECORDED = {"3.4", "3.6", "3.7", "4.13", "4.16", "4.17"}
+RECORDED = {"3.4", "3.6", "3.7", "4.13", "4.16", "4.17", "B.2"}
 TINY = {
     "repeats": 1,
     "performances": 1,
     "trials": 1,
     "unfloored_trials": 1,
     "test": 1,
+    "tasks": 1,
     "kinds": ("line",),
 }
 CURVES = {
@@ -49,7 +51,7 @@ def _with(figure, settings):
     )
 
 
-def test_the_catalog_holds_the_figures_of_the_thesis_in_its_order():
+def test_the_catalog_holds_the_figures_of_the_thesis_in_its_order_and_then_others():
     assert [figure.number for figure in FIGURES] == NUMBERS
     assert len({figure.name for figure in FIGURES}) == len(NUMBERS)
 
@@ -115,6 +117,14 @@ def test_curves_tell_the_share_recognized_of_every_method_with_its_interval():
             assert len(shares) == len(numbers["noise"]) == 2
             assert all(0 <= share <= 1 for share in shares)
             assert len(numbers[f"line_{method}-hmm{floor}_ci95"]) == 2
+
+
+def test_a_hand_that_leaves_its_task_is_told_so_and_not_before():
+    (figure,) = find_figures(["B.2"])
+    numbers = figure.draw(figure.settings, figure.generator(5)).numbers
+    assert numbers["steps_to_unknown"] is not None
+    assert numbers["unknown_in_task"] < 0.05 < 0.2 < numbers["unknown_after"]
+    assert numbers["steps"] > numbers["leaves_at_step"] + numbers["steps_to_unknown"]
 
 
 def test_delays_belong_to_the_changes_drawn():

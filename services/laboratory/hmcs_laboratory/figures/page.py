@@ -44,7 +44,7 @@ _PAGE = Template(
 <h1>The figures of the thesis, made anew</h1>
 <p>D. Aarno, <i>Intention Recognition in Human Machine Collaborative Systems</i> (KTH, 2007). For
 each figure: what the thesis shows, what came out here, with numbers computed from the very data
-drawn, and where the two differ.</p>
+drawn, and where the two differ. Figures B.1 and B.2 are of what the thesis leaves open.</p>
 $fast
 <nav>
 $contents
