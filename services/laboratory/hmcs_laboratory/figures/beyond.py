@@ -240,7 +240,6 @@ def _draw_reliability(above: Axes, below: Axes, told: Reliability, index: int, l
     style: dict[str, Any] = {
         "color": color_of(index),
         "marker": mark_of(index),
-        "ms": 5,
         "linewidth": 1.4,
     }
     above.plot(told.said[enough], told.came_true[enough], label=label, ms=5, **style)
