@@ -168,7 +168,7 @@ def test_a_beginning_is_compared_with_beginnings_by_what_compares_whole_motions(
     rng = np.random.default_rng(4)
     curves = random_references(CurveSettings(kind="circle").references, 3, rng)
     easy = performed(curves, SETTINGS.operator(0.02), training=3, test=2, rng=rng)
-    for name in ("hmcs-gestemes", "svm", "lda"):
+    for name in ("hmcs-gestemes", "hmcs-gestemes-share", "svm", "lda"):
         (method,) = (method for method in WHOLE if method.name == name)
         rng = np.random.default_rng(1)
         part, whole = measured_on(method, easy, rng, (0.5, 1.0))

@@ -16,13 +16,19 @@ from hmcs_laboratory.methods.online_peers import (
 )
 from hmcs_laboratory.methods.recognizers import recognizer
 from hmcs_laboratory.methods.series import fit_dtw, fit_rocket, prepare_dtw, prepare_rocket
-from hmcs_laboratory.methods.single import fit_single
+from hmcs_laboratory.methods.single import fit_single, fit_single_of_share
 from hmcs_laboratory.methods.symbol_hmms import SYMBOL_METHODS
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
 
 WHOLE = (
     WholeMethod("hmcs-gestemes", "hmcs.recognition.single_gestemes", fit_single),
+    WholeMethod(
+        "hmcs-gestemes-share",
+        "the same, told which share of the motion it sees, as DTW, MiniRocket, SVM and LDA are",
+        fit_single_of_share,
+        whole_only=True,
+    ),
     *SYMBOL_METHODS,
     WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian, prepare),
     WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on symbols", fit_symbols, prepare),

@@ -19,12 +19,19 @@ class Single:
     """A closed loop and shapes, pooled."""
 
     knowledge: SingleGestemes
+    same_share: bool = False
+    """Whether it learned from the share of motions that it is shown."""
 
     def classify(self, positions: Array, *, complete: bool) -> Array:
         """Return log P(gesteme | motion), shape (G,)."""
-        return scores(self.knowledge, positions, whole=complete)
+        return scores(self.knowledge, positions, whole=complete or self.same_share)
 
 
 def fit_single(examples: Examples, _rng: np.random.Generator) -> Single:
     """Learn from whole gestemes; beginnings are recognized by the same knowledge."""
     return Single(learn_single(examples))
+
+
+def fit_single_of_share(examples: Examples, _rng: np.random.Generator) -> Single:
+    """Learn from beginnings as if they were whole, to recognize beginnings of the same share."""
+    return Single(learn_single(examples), same_share=True)
