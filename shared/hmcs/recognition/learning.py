@@ -29,9 +29,9 @@ def learn(
     `settings` are the recognizer's own, its defaults where None. Without `rng` what is random is
     drawn from a generator of seed 0, so that learning twice gives the same model.
 
-    Raises LearningError when there are no demonstrations, a label is no state of the task, a
-    gesteme has no demonstration, or a segment is too short to hold two steps; UserError for an
-    unknown recognizer.
+    Raises LearningError when there are no demonstrations, one has samples that are none or not a
+    label each, a label is no state of the task, a gesteme has no demonstration, or a segment is too
+    short to hold two steps; UserError for an unknown recognizer.
     """
     kind = kind_named(recognizer)
     segments = segments_of(task, demonstrations)
@@ -42,7 +42,8 @@ def learn(
                 f"gesteme {gesteme.name!r} of task {task.name!r} has no demonstration: "
                 "add one with its label"
             )
-        progress(f"{gesteme.name}: {len(own)} demonstrations")
+        plural = "" if len(own) == 1 else "s"
+        progress(f"{gesteme.name}: {len(own)} demonstration{plural}")
     lesson = Lesson(
         task,
         tuple(demonstrations),

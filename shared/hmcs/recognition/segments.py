@@ -87,6 +87,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
         raise LearningError(f"no demonstrations of task {task.name!r}: give at least one")
     segments: list[Segment] = []
     for demonstration in demonstrations:
+        _check(demonstration)
         labeled, own, last = False, list[Segment](), -1
         for label, run in groupby(
             range(len(demonstration.positions)), key=demonstration.states.__getitem__
@@ -170,6 +171,44 @@ def _meant(task: Task, label: str, demonstration: str) -> tuple[int, int]:
             + " or ".join(f"{state_name}/{name}" for name in state.gestemes)
         )
     return found[0], [gesteme.name for gesteme in task.gestemes].index(chosen)
+
+
+def _check(demonstration: Demonstration) -> None:
+    """Refuse arrays that no file could have held; files are checked as they are read."""
+    name, samples = demonstration.name, len(demonstration.positions)
+    expected = {
+        "time_s": (samples,),
+        "positions": (samples, 3),
+        "orientations": (samples, 4),
+        "wrenches": (samples, 6),
+    }
+    for field, shape in expected.items():
+        values = getattr(demonstration, field)
+        if values is None:
+            continue
+        if np.shape(values) != shape:
+            raise LearningError(
+                f"demonstration {name!r}: {field} have shape {np.shape(values)}, expected {shape}: "
+                "give a row a sample, with z = 0 in a plane"
+            )
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values).reshape(samples, -1).all(axis=1))[0])
+            raise LearningError(
+                f"demonstration {name!r}: {field} of sample {row} are not finite: leave it out"
+            )
+    if samples < 2:
+        raise LearningError(f"demonstration {name!r} has {samples} samples: give two at least")
+    if len(demonstration.states) != samples:
+        raise LearningError(
+            f"demonstration {name!r} has {len(demonstration.states)} labels for {samples} samples: "
+            "give one each, None where the motion belongs to no state"
+        )
+    late = np.flatnonzero(np.diff(demonstration.time_s) <= 0)
+    if len(late):
+        raise LearningError(
+            f"demonstration {name!r}: time_s of sample {late[0] + 1} is not after the one before: "
+            "times must rise"
+        )
 
 
 def _extent(positions: Array) -> float:

@@ -103,6 +103,10 @@ def bad(motion, **changes) -> Demonstration:
     return motion._replace(**changes)
 
 
+def spoiled(values):
+    return np.where(np.arange(len(values))[:, None] == 4, np.nan, values)
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
@@ -110,6 +114,17 @@ def bad(motion, **changes) -> Demonstration:
         (lambda m: [bad(m, states=(None,) * len(m.states))], "has no labels: add a column 'state'"),
         (lambda m: [bad(m, states=("fly",) * len(m.states))], "'fly' is no state.*go, turn, rise"),
         (lambda m: [bad(m, states=("go",) * len(m.states))], "gesteme 'round'.*no demonstration"),
+        (lambda m: [bad(m, states=m.states[:-5])], "labels for .* samples: give one each"),
+        (lambda m: [bad(m, positions=m.positions[:, :2])], r"positions have shape .*, 3\)"),
+        (
+            lambda m: [bad(m, positions=spoiled(m.positions))],
+            "positions of sample 4 are not finite",
+        ),
+        (lambda m: [m.cut(0, 1)], "has 1 samples: give two"),
+        (lambda m: [m.cut(0, 0)], "has 0 samples: give two"),
+        (lambda m: [bad(m, time_s=m.time_s * 0)], "sample 1 is not after the one before"),
+        (lambda m: [bad(m, wrenches=np.zeros((3, 6)))], r"wrenches have shape \(3, 6\)"),
+        (lambda m: [bad(m, positions=m.positions * 0)], "makes 0 steps, but 2 are needed"),
         (lambda m: [bad(m, positions=m.positions * 1e-3)], "'go'.*makes 0 steps, but 2 are needed"),
     ],
 )
