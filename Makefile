@@ -11,7 +11,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench schemas test-containers clean
+.PHONY: help setup demo test lint bench peers schemas test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -32,6 +32,9 @@ lint: $(READY) ## put the code in the house's format and name what is left to me
 
 bench: $(READY) ## measure speed and recognition in full, each against its goal; some ten minutes
 	@PYTHONPATH=tests $(RUN)/python -m bench
+
+peers: $(READY) ## install the libraries that studies compare with, beside the rest
+	@$(UV) sync --frozen --quiet --group peers --python $(RUN)/python
 
 schemas: $(READY) ## rewrite the JSON Schemas and golden bytes of all messages
 	@$(RUN)/python -m hmcs.bus.schemas tests/contract

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench import accuracy, messages, step_to_belief, two_hops, whole_stack
+from bench import accuracy, hmm_speed, messages, step_to_belief, two_hops, whole_stack
 from bench.figures import Figure, tell
 
 
@@ -48,3 +48,16 @@ def test_human_motion_is_recognized(way: tuple[int, int]) -> None:
     assert values["state accuracy"] >= accuracy.ACCURACY
     assert values["switch delay, p95"] <= accuracy.P95_DELAY_STEPS
     assert values["false switches in 1000 steps"] <= 2 * accuracy.FALSE_SWITCHES
+
+
+def test_hidden_markov_models_are_learned_and_filtered_faster_than_by_hmmlearn() -> None:
+    values = measured(hmm_speed.measure(2))
+    assert (
+        values["hmmlearn's time / ours, its faster implementation"] > hmm_speed.LEARNING_RATIO / 2
+    )
+    assert values["largest relative difference of log-likelihoods"] < hmm_speed.SAME_LIKELIHOOD
+    (filtering,) = (value for name, value in values.items() if "scores the sequence anew" in name)
+    assert filtering > hmm_speed.FILTER_RATIO
+    large = [value for name, value in values.items() if str(hmm_speed.LARGE_MODELS) in name]
+    assert len(large) == 2
+    assert max(large) < 3 * hmm_speed.LARGE_UPDATE_US

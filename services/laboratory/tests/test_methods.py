@@ -194,5 +194,5 @@ def test_online_peers_give_probabilities_and_look_at_nothing_to_come(method):
 def test_a_missing_library_is_told_with_what_installs_it(monkeypatch, data):
     monkeypatch.setitem(sys.modules, "hmmlearn", None)
     monkeypatch.delitem(sys.modules, "hmmlearn.hmm", raising=False)
-    with pytest.raises(UserError, match="hmmlearn is not installed: `uv sync --group peers`"):
+    with pytest.raises(UserError, match="hmmlearn is not installed: `make peers`"):
         fitted("hmmlearn-gaussian", data)

@@ -17,6 +17,6 @@ def peer(module: str) -> Any:
             raise
         library = module.partition(".")[0]
         raise UserError(
-            f"{library} is not installed: `uv sync --group peers` installs all peers, or leave "
+            f"{library} is not installed: `make peers` installs all peers, or leave "
             "its methods out with --set methods=NAME,NAME"
         ) from error
