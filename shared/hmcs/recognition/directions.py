@@ -125,7 +125,7 @@ def pooled_directions(
         [len(np.unique(owner[group == g])) / len(motions) for g in range(group.max() + 1)]
     )
     kept = np.flatnonzero(support >= min(settings.support_share, support.max()))
-    directions = np.array([_unit(chord[group == g].sum(axis=0)) for g in kept])
+    directions = np.array([nominal_direction(chord[group == g].sum(axis=0)) for g in kept])
     nearest = (chord @ directions.T).argmax(axis=1)
     nearest[:] = np.where(np.isin(group, kept), np.searchsorted(kept, group), nearest)
     labels, begin = [], 0
@@ -170,7 +170,7 @@ def elbow_directions(
     support = np.array(
         [np.mean([(own == k).any() for own in renumbered]) for k in range(len(used))]
     )
-    directions = np.array([_unit(center) for center in centers[used[order]]])
+    directions = np.array([nominal_direction(center) for center in centers[used[order]]])
     return FoundDirections(directions, support, tuple(renumbered))
 
 
@@ -182,7 +182,7 @@ def distinct_directions(directions: ArrayLike, merge_angle_rad: float) -> Array:
     """
     given = np.asarray(directions, dtype=float)
     group = _grouped(given / np.linalg.norm(given, axis=1, keepdims=True), merge_angle_rad)
-    return np.array([_unit(given[group == g].sum(axis=0)) for g in range(group.max() + 1)])
+    return np.array([nominal_direction(given[group == g].sum(axis=0)) for g in range(group.max() + 1)])
 
 
 def _checked(demonstrations: Sequence[ArrayLike], least: int) -> list[Array]:
@@ -258,7 +258,7 @@ def _merged(
     chance = settings.tell_apart * variance * parameters * math.log(points)
     group = _grouped(chord, settings.merge_angle_rad, forms, chance)
     count = int(group.max()) + 1
-    directions = np.array([_unit(chord[group == g].sum(axis=0)) for g in range(count)])
+    directions = np.array([nominal_direction(chord[group == g].sum(axis=0)) for g in range(count)])
     labels, present = [], np.zeros((len(motions), count), dtype=bool)
     for index, one in enumerate(sequence.fitted):
         own = group[[piece.line for piece in one.pieces]]
@@ -299,5 +299,14 @@ def _grouped(
         group[group == b] = a
 
 
-def _unit(vector: Array) -> Array:
-    return np.asarray(vector / np.linalg.norm(vector))
+def nominal_direction(moved: Array) -> Array:
+    """Return the direction of the sum of some steps, shape (D,).
+
+    Raises DirectionError where they cancel out.
+    """
+    length = np.linalg.norm(moved)
+    if not length > 0:
+        raise DirectionError(
+            "steps of one direction cancel out: demonstrate more, or find directions otherwise"
+        )
+    return np.asarray(moved / length)

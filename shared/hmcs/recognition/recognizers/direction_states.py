@@ -18,6 +18,7 @@ from hmcs.recognition.directions import (
     FoundDirections,
     elbow_directions,
     find_directions,
+    nominal_direction,
     pooled_directions,
 )
 from hmcs.recognition.hmm.bank import ForwardBank
@@ -123,15 +124,12 @@ def learn_directions(
     `sequences` are the steps of each demonstration, unit vectors or of their own length, shape
     (T, D). `labels`, for the discovery `labels` only, says of each step which part of the task it
     belongs to, −1 where none, shape (T,).
-    Raises DirectionError for demonstrations without directions, and for labels that are missing;
+    Raises DirectionError for demonstrations without directions or whose steps cancel out, and for
+    labels that are missing;
     LearningMissingError for support vectors without scikit-learn.
     """
     steps = [np.asarray(sequence, dtype=float) for sequence in sequences]
     found = _found(steps, settings, rng, labels)
-    if not np.allclose(np.linalg.norm(found.directions, axis=1), 1.0):
-        raise DirectionError(
-            "steps of one direction cancel out: demonstrate more, or find directions otherwise"
-        )
     units = [unit_rows(own) for own in steps]
     estimator = learn_estimator(
         np.concatenate(units),
@@ -227,7 +225,7 @@ def _labeled(steps: Sequence[Array], labels: Sequence[ArrayLike] | None) -> Foun
     if not len(parts):
         raise DirectionError("no step has a label: label a part of a demonstration at least")
     stacked, part = np.concatenate(units), np.concatenate(given)
-    directions = unit_rows(np.array([stacked[part == p].sum(axis=0) for p in parts]))
+    directions = np.array([nominal_direction(stacked[part == p].sum(axis=0)) for p in parts])
     known = [
         np.where(own >= 0, np.searchsorted(parts, own), (unit @ directions.T).argmax(axis=1))
         for unit, own in zip(units, given, strict=True)
