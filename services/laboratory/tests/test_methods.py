@@ -16,6 +16,7 @@ from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import CurveSettings
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
 from hmcs_laboratory.methods.features import directions, shape_and_length
+from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols
 from hmcs_laboratory.methods.online import followed, learned
 from hmcs_laboratory.methods.registered import ONLINE_PEERS, WHOLE
 from hmcs_laboratory.methods.whole import measured_on
@@ -67,6 +68,14 @@ def test_vector_methods_decide_as_scikit_learn_does(data, name, classifier):
     ]
     by_hand = classifier.fit(vectors(data.training), GESTEMES).predict(vectors(data.test))
     assert decided == by_hand.tolist()
+
+
+@pytest.mark.parametrize("fit", [fit_symbols, fit_gaussian])
+def test_hmmlearn_scores_motions_no_longer_than_its_states(fit):
+    ahead = np.outer(np.arange(4.0), [1.0, 0.0])
+    able = fit([[ahead, ahead], [-ahead, -ahead]], np.random.default_rng(0))
+    assert np.argmax(able.classify(ahead, complete=True)) == 0
+    assert np.argmax(able.classify(-ahead, complete=True)) == 1
 
 
 def test_our_gestemes_score_as_single_gestemes_does(data):

@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmcs.errors import UserError
 from hmcs.recognition.chords import Chords, Piece, cut, median_spread
 from hmcs.recognition.clustering import assign
 from hmcs.recognition.elbow import CusumSettings, cusum_elbow, search_clusters
@@ -31,12 +30,13 @@ from hmcs.recognition.line_sequence import (
     trimmed_chord,
     without_one,
 )
+from hmcs.recognition.segments import LearningError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 
-class DirectionError(UserError):
+class DirectionError(LearningError):
     """Demonstrations in which no directions can be found; says which, why, and what to do."""
 
 

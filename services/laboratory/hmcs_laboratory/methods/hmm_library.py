@@ -123,7 +123,12 @@ def _pieces(observed: Array, count: int) -> list[Array]:
 def _fitted(model: Any, observed: Sequence[Array]) -> Any:
     # It warns of few data: that they are few is what is studied.
     logging.getLogger("hmmlearn").setLevel(logging.ERROR)
-    return model.fit(np.concatenate(observed), [len(each) for each in observed])
+    model.fit(np.concatenate(observed), [len(each) for each in observed])
+    # A state that is never left, for it is never reached or only at the end, loses its row in
+    # re-estimation, and hmmlearn then refuses to score with its own model.
+    lost = ~model.transmat_.any(axis=1)
+    model.transmat_[lost, lost] = 1.0
+    return model
 
 
 def _floored(emission: Array) -> Array:
