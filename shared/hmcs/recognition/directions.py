@@ -182,7 +182,9 @@ def distinct_directions(directions: ArrayLike, merge_angle_rad: float) -> Array:
     """
     given = np.asarray(directions, dtype=float)
     group = _grouped(given / np.linalg.norm(given, axis=1, keepdims=True), merge_angle_rad)
-    return np.array([nominal_direction(given[group == g].sum(axis=0)) for g in range(group.max() + 1)])
+    return np.array(
+        [nominal_direction(given[group == g].sum(axis=0)) for g in range(group.max() + 1)]
+    )
 
 
 def _checked(demonstrations: Sequence[ArrayLike], least: int) -> list[Array]:
