@@ -26,8 +26,10 @@ Integers = NDArray[np.int32]
 class FilterSettings(NamedTuple):
     """The probabilities of what the task does not foresee."""
 
-    any_state: float = 0.02
+    any_state: float = 0.05
     """That a segment is followed by any state at all instead of one the task names."""
+    again: float = 0.5
+    """That a segment which ends the task is followed by any state instead of unknown motion."""
     unknown_after: float = 1e-3
     """That a segment is followed by unknown motion."""
     abandon: float = 1e-4
@@ -126,14 +128,16 @@ class SegmentFilter:
         followed = leaving @ chain.transition
         ended = float(leaving.sum() - followed.sum())
         expected = 1.0 - settings.any_state - settings.unknown_after
-        states = (
-            expected * followed
-            + (settings.any_state * float(leaving.sum()) + settings.recover * self._unknown) / count
+        anywhere = (
+            settings.any_state * float(leaving.sum())
+            + settings.again * expected * ended
+            + settings.recover * self._unknown
         )
+        states = expected * followed + anywhere / count
         unknown = (
             self._unknown * (1.0 - settings.recover)
             + settings.unknown_after * float(leaving.sum())
-            + expected * ended
+            + (1.0 - settings.again) * expected * ended
             + abandoned
         )
         return stays * (1.0 - settings.abandon), self._spread(states), unknown

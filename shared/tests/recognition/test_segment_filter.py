@@ -11,7 +11,7 @@ from hmcs.recognition.gestemes import StepEvidence
 from hmcs.recognition.segment_filter import FilterSettings, SegmentFilter, TaskChain
 
 SETTINGS = FilterSettings(
-    any_state=0.05, unknown_after=0.02, abandon=0.01, recover=0.1, drop_below=0.0
+    any_state=0.05, again=0.3, unknown_after=0.02, abandon=0.01, recover=0.1, drop_below=0.0
 )
 UNKNOWN = "unknown"
 
@@ -93,14 +93,15 @@ def enumerate_segmentations(chain, evidence):
             slot, start = history[-1]
             leave, _ = lookup(t, slot, start)
             row = chain.transition[chain.slot_state[slot]]
-            follow = expected * row + SETTINGS.any_state / states
+            ended = expected * (1 - row.sum())
+            follow = expected * row + (SETTINGS.any_state + SETTINGS.again * ended) / states
             options = [((k, t), leave * opening(k, follow)) for k in slots]
             options.append(((slot, start), (1 - leave) * (1 - SETTINGS.abandon)))
             options.append(
                 (
                     UNKNOWN,
                     (1 - leave) * SETTINGS.abandon
-                    + leave * (SETTINGS.unknown_after + expected * (1 - row.sum())),
+                    + leave * (SETTINGS.unknown_after + (1 - SETTINGS.again) * ended),
                 )
             )
         for hypothesis, p in options:
