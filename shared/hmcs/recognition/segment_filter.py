@@ -5,7 +5,10 @@ Here that question is part of the state: a hypothesis is a task state, the geste
 with, and the step its segment started at. Summing over all hypotheses is exact inference in the
 layered model with soft evidence upward, and no restart has to be assumed.
 
-Each step: exit, new starts, condition on the evidence, normalize, drop what is negligible.
+Each step: exit, new starts, condition on the evidence, normalize, drop what is negligible. The
+cost of a step grows with h, which dropping keeps near the number of starts that are plausible (tens
+for a task of five states): some 210 µs a step on one core with five gestemes, the gestemes' own
+share, which grows with the pairs of gesteme and start, included (`hmcs study restart`).
 Shapes: S states, K slots (a slot is one gesteme in one state), h living hypotheses.
 """
 
