@@ -5,29 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hmcs.bus.messages import Belief, Command, FixtureState, Motion
-from hmcs.fixtures.controller import Fixture, Guides, OperatorSample, Rules
+from hmcs.fixtures.controller import Fixture, Guides, OperatorSample
+from hmcs.fixtures.rules import likely_successors, rules_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.recognition.model import Model
 
 
 def guides_of(model: Model) -> Guides:
     """Return the paths a model learned and the rules of its task."""
-    fixture, robot = model.task.fixture, model.task.robot
-    return Guides(
-        model.paths,
-        Rules(
-            law=fixture.law,
-            maximum_factor=fixture.maximum_factor,
-            gain_rise_per_s=fixture.gain_rise_per_s,
-            gain_fall_per_s=fixture.gain_fall_per_s,
-            operator_scale=fixture.operator_scale,
-            pull=fixture.pull,
-            pull_full_at_m=fixture.pull_full_at_m,
-            pull_reach_m=fixture.pull_reach_m,
-            speed_limit_m_s=robot.speed_limit_m_s,
-            angular_speed_limit_rad_s=robot.angular_speed_limit_rad_s,
-        ),
-    )
+    return Guides(model.paths, rules_of(model.task), likely_successors(model.task))
 
 
 def sample_of(motion: Motion, seq: int) -> OperatorSample:

@@ -196,6 +196,9 @@ class FixtureSetup(Part):
 
     law: Literal["general", "thesis"] = "general"
     """`general` is (2.29), `thesis` is (3.6)."""
+    compliance: Literal["belief", "insistence"] = "belief"
+    """What softens the fixture: `belief` is (3.2), the less sure the softer; `insistence` lets go
+    besides of an operator whose hand keeps going across the guide."""
     maximum_factor: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.8
     """ξ of (3.6): the fixturing factor when the recognition is certain."""
     gain_rise_per_s: Positive = 6.0
@@ -209,3 +212,15 @@ class FixtureSetup(Part):
     """A robot so far from the path is led back with full strength."""
     pull_reach_m: Positive = 0.06
     """Much farther than this a path counts as left, and leads nobody back."""
+    shift_beyond_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    """A path goes on from where the one before it ended, if the robot is no farther beside it than
+    this when its segment begins; otherwise it is laid at the robot. 0 lays it there always."""
+    look_ahead: bool = False
+    """Whether a path goes on into the one that most likely follows it, so that the fixture turns
+    with the hand before the next state is recognized."""
+    tremor: Literal["none", "notch"] = "none"
+    """How tremor is taken out of the operator's velocity: a notch lets nothing pass at its
+    center."""
+    tremor_hz: Positive = 10.0
+    tremor_quality: Positive = 0.7
+    """Center of the notch, and how narrow it is: center over width."""

@@ -1,0 +1,1 @@
+"""What assistance is worth: simulated operators at a fixture, in process, faster than real time."""

@@ -1,0 +1,177 @@
+"""The closed loop in process: an operator, a recognizer, the fixture controller and a robot.
+
+They are the very objects that the services run, driven by a clock of their own; the robot is a
+first-order lag of its tool's velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.fixtures.controller import Controller, Fixture, Guides, OperatorSample
+from hmcs.fixtures.rules import Rules, Safeguards, likely_successors
+from hmcs.fixtures.trust import SegmentBelief
+from hmcs.motion.closed_loop_operators import ClosedLoopOperator
+from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.steps import DeadZone
+from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.recognizers import recognizer_of
+from hmcs_laboratory.assistance.scenarios import Taught
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """How the robot follows its reference velocity."""
+
+    lag_s: float = 0.03
+    """Time constant of a first-order lag."""
+
+
+class Run(NamedTuple):
+    """One performance; T samples."""
+
+    period_s: float
+    arrived: bool
+    """Whether it came to the end of the path before time was up."""
+    robot: Array
+    """Where the tool was, m, shape (T, 3)."""
+    hand_velocity: Array
+    """m/s, shape (T, 3)."""
+    intended: Array
+    """The hand's velocity without what was not meant, m/s, shape (T, 3)."""
+    command: Array
+    """The robot's reference velocity, m/s, shape (T, 3)."""
+    passed: Array
+    """What the fixture would have made of `intended`, m/s, shape (T, 3)."""
+    force: Array
+    """Of the fixture on the hand, N, shape (T, 3)."""
+    progress_m: Array
+    """How far along the meant path the operator saw the robot, shape (T,)."""
+    factor: Array
+    """k, shape (T,)."""
+    states: tuple[str, ...]
+    """Task state believed at each sample; empty before the first belief."""
+    confidence: Array
+    """Its probability, shape (T,)."""
+
+
+def perform(
+    operator: ClosedLoopOperator,
+    start: Array,
+    model: Model,
+    rules: Rules,
+    *,
+    period_s: float,
+    most_s: float,
+    robot: Robot,
+) -> Run:
+    """Return how an operator performs a task from `start`, m, shape (3,), under these rules."""
+    controller = Controller(Safeguards())
+    controller.load(model.name, Guides(model.paths, rules, likely_successors(model.task)))
+    controller.activate(model.name)
+    recognizer = recognizer_of(model)
+    zone = DeadZone(model.task.dead_zone_m)
+    follow = 1.0 - float(np.exp(-period_s / robot.lag_s)) if robot.lag_s > 0 else 1.0
+    hand, tool, velocity = np.zeros(3), np.array(start, dtype=float), np.zeros(3)
+    rows: list[tuple[Array, ...]] = []
+    states: list[str] = []
+    state, confidence, arrived = "", 0.0, False
+    controller.sampled(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
+    for tick in range(1, int(most_s / period_s) + 1):
+        now_s = tick * period_s
+        controller.robot_moved(now_s, tool)
+        motion = operator.step(tool)
+        if motion.arrived:
+            arrived = True
+            break
+        hand = hand + motion.velocity * period_s
+        twist = np.concatenate([motion.velocity, np.zeros(3)])
+        fixture = controller.sampled(
+            now_s, OperatorSample(tick, hand, twist, dead_man=True, clutch=False)
+        )
+        step = zone.push(hand)
+        if step is not None:
+            controller.stepped(now_s, step.index, step.position, step.displacement, tick)
+            recognition = recognizer.step(step)
+            belief = belief_of(model, recognition)
+            controller.believed(model.name, belief)
+            state, confidence = belief.state, belief.probability
+        rows.append(
+            (
+                tool,
+                motion.velocity,
+                motion.intended,
+                fixture.command_twist[:3],
+                passed_by(fixture, motion.intended),
+                fixture.wrench[:3],
+                np.array([motion.progress_m, fixture.factor, confidence]),
+            )
+        )
+        states.append(state)
+        velocity = velocity + follow * (fixture.command_twist[:3] - velocity)
+        tool = tool + velocity * period_s
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return Run(
+        period_s,
+        arrived,
+        *columns[:6],
+        columns[6][:, 0],
+        columns[6][:, 1],
+        tuple(states),
+        columns[6][:, 2],
+    )
+
+
+def demonstrated(
+    operator: ClosedLoopOperator, taught: Taught, name: str, *, period_s: float, most_s: float
+) -> Demonstration:
+    """Return an unaided performance of what is taught, each sample labeled with its state."""
+    here = taught.path.points[0]
+    positions, states = [here], [taught.states[0]]
+    progress_m = 0.0
+    for _ in range(int(most_s / period_s)):
+        motion = operator.step(here)
+        if motion.arrived:
+            break
+        here = here + motion.velocity * period_s
+        progress_m = max(progress_m, motion.progress_m)
+        positions.append(here)
+        states.append(taught.state_at(progress_m))
+    time_s = period_s * np.arange(len(positions))
+    return Demonstration(name, time_s, np.array(positions), tuple(states))
+
+
+def belief_of(model: Model, recognition: Recognition) -> SegmentBelief:
+    """Return what a fixture wants to know of a recognition."""
+    belief = recognition.belief
+    likely = int(np.argmax(belief.states))
+    return SegmentBelief(
+        step=belief.step,
+        state=model.state_names[likely],
+        probability=float(belief.states[likely]),
+        gesteme=model.gesteme_names[belief.gesteme],
+        segment_start=belief.segment_start,
+        unknown=belief.unknown,
+        unknown_alarm=recognition.unknown_alarm,
+        complete=not belief.missing,
+    )
+
+
+def passed_by(fixture: Fixture, velocity: Array) -> Array:
+    """Return what the fixture's law makes of another velocity, m/s, shape (3,)."""
+    twist = np.concatenate([velocity, np.zeros(3)])
+    return np.asarray(fixture.objective.wanted(twist)[:3])
+
+
+def mean_of(runs: Sequence[float]) -> float:
+    """Return the mean of what could be measured; NaN where nothing could."""
+    known = [value for value in runs if not np.isnan(value)]
+    return float(np.mean(known)) if known else float("nan")

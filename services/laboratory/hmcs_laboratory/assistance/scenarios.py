@@ -1,0 +1,189 @@
+"""What operators are assisted in: the path they were taught, the one they mean, what is in the way.
+
+Each scenario is made from the same random numbers for every law, so that laws differ in nothing
+else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.motion.demonstrations import read_csv
+from hmcs.motion.detours import Detour, around
+from hmcs.motion.lasa import drawings, read_drawing
+from hmcs.motion.operators import joined
+from hmcs.motion.paths import Path, resample
+from hmcs.task import Task, find_task, load_task
+
+Array = NDArray[np.float64]
+
+_SAMPLE_M = 0.002
+LENGTHS = (0.7, 1.3)
+"""In a changed workspace every line is so many times as long as it was taught, drawn by lot."""
+WRONG_BY_M = 0.02
+"""So far beside the taught curves is what an operator means whose model is wrong."""
+OBSTACLE_M = 0.02
+"""Radius of the unexpected obstacle."""
+CLEARANCE_M = 0.015
+"""That operators mean to keep from it."""
+RUN_UP_M = 0.03
+"""So long before it they begin to leave the path."""
+_DRAWING_POINTS = 200
+
+
+class Taught(NamedTuple):
+    """A task, and the path along which it is demonstrated."""
+
+    task: Task
+    path: Path
+    """In the workspace, m."""
+    states: tuple[str, ...]
+    """Of its segments, in their order."""
+    ends_m: Array
+    """Arc length at which each segment ends, m, shape (S,)."""
+
+    def state_at(self, progress_m: float) -> str:
+        """Return the state that the path is in so far along it."""
+        index = int(np.searchsorted(self.ends_m, progress_m, side="right"))
+        return self.states[min(index, len(self.states) - 1)]
+
+
+class Sphere(NamedTuple):
+    """Something in the way."""
+
+    center: Array
+    """m, shape (3,)."""
+    radius_m: float
+
+
+class Scenario(NamedTuple):
+    """What an operator means to do."""
+
+    meant: Path
+    """m, workspace."""
+    obstacle: Sphere | None = None
+    detour: Detour | None = None
+    """How the operator goes around it."""
+    usual: Path | None = None
+    """The path without the detour."""
+
+
+Family = Callable[[np.random.Generator, float], Taught]
+"""Makes what is taught in a trial; with the dead zone δ, m."""
+Meaning = Callable[[Taught, np.random.Generator], Scenario]
+"""Makes what the operator means to do then."""
+
+
+def taught_lines(rng: np.random.Generator, dead_zone_m: float) -> Taught:
+    """Return the four lines of experiment 1 (fig. 3.8)."""
+    del rng
+    task = load_task("lines-through-obstacles").model_copy(update={"dead_zone_m": dead_zone_m})
+    corners = read_csv(find_task("lines-through-obstacles").with_suffix(".csv")).positions
+    return _taught(task, list(zip(corners[:-1], corners[1:], strict=True)))
+
+
+def taught_curves(rng: np.random.Generator, dead_zone_m: float) -> Taught:
+    """Return the five human-drawn curves of the shipped chain, of each one drawing by lot."""
+    task = load_task("human-shapes").model_copy(update={"dead_zone_m": dead_zone_m})
+    curves = []
+    for state in task.states:
+        shape = state.gestemes[0]
+        number = int(rng.integers(1, len(drawings(shape)) + 1))
+        curves.append(resample(read_drawing(shape, number, task).positions, _DRAWING_POINTS))
+    return _taught(task, curves)
+
+
+def as_taught(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return the path as it was taught."""
+    del rng
+    return Scenario(taught.path)
+
+
+def changed_lengths(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return the path with every segment longer or shorter than taught (experiment 2)."""
+    factors = rng.uniform(*LENGTHS, size=len(taught.states))
+    curves = [
+        factor * (points - points[0])
+        for factor, points in zip(factors, _segments(taught), strict=True)
+    ]
+    meant, _ = joined(curves, _SAMPLE_M)
+    return Scenario(Path(meant + taught.path.points[0]))
+
+
+def unexpected_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return the path around a sphere that nobody taught (experiment 3)."""
+    lengths = np.diff(np.concatenate([[0.0], taught.ends_m]))
+    needed_m = 2.0 * (OBSTACLE_M + CLEARANCE_M + RUN_UP_M)
+    segment = int(rng.choice(np.flatnonzero(lengths > needed_m)))
+    spare_m = lengths[segment] - needed_m
+    at_m = taught.ends_m[segment] - 0.5 * lengths[segment] + spare_m * rng.uniform(-0.4, 0.4)
+    aside = rng.normal(size=3)
+    aside *= 0.25 * OBSTACLE_M / np.linalg.norm(aside)
+    obstacle = Sphere(taught.path.at(at_m) + aside, OBSTACLE_M)
+    detour = around(
+        taught.path,
+        obstacle.center,
+        obstacle.radius_m,
+        clearance_m=CLEARANCE_M,
+        run_up_m=RUN_UP_M,
+    )
+    return Scenario(detour.path, obstacle, detour, taught.path)
+
+
+def beside_the_model(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return each curve bent to one side: between its ends it lies beside what was taught."""
+    curves = []
+    for points in _segments(taught):
+        share = np.linspace(0.0, 1.0, len(points))
+        rise = np.clip(np.minimum(share, 1.0 - share) / 0.2, 0.0, 1.0)
+        aside = 0.5 * (1.0 - np.cos(np.pi * rise))
+        tangents = np.gradient(points, axis=0)
+        tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+        across = np.cross(tangents, _normal(points)) * rng.choice([-1.0, 1.0])
+        curves.append(points + WRONG_BY_M * aside[:, None] * across)
+    meant, _ = joined(curves, _SAMPLE_M)
+    return Scenario(Path(meant))
+
+
+class AssistedTask(NamedTuple):
+    """A task of the study."""
+
+    family: str
+    meaning: Meaning
+
+
+FAMILIES: Mapping[str, Family] = {"lines": taught_lines, "curves": taught_curves}
+TASKS: Mapping[str, AssistedTask] = {
+    "lines": AssistedTask("lines", as_taught),
+    "changed-workspace": AssistedTask("lines", changed_lengths),
+    "unexpected-obstacle": AssistedTask("lines", unexpected_obstacle),
+    "human-curves": AssistedTask("curves", as_taught),
+    "wrong-model": AssistedTask("curves", beside_the_model),
+}
+"""Tasks by name; those of a family are taught alike."""
+
+
+def _taught(task: Task, curves: Sequence[Sequence[Array] | Array]) -> Taught:
+    whole, owners = joined([np.asarray(curve) for curve in curves], _SAMPLE_M)
+    path = Path(whole + np.asarray(task.robot.tool_start_m) - whole[0])
+    last = np.searchsorted(owners, np.arange(len(curves)), side="right")
+    ends_m = path.arc_length[np.minimum(last, len(whole) - 1)]
+    return Taught(task, path, tuple(state.name for state in task.states), ends_m)
+
+
+def _segments(taught: Taught) -> list[Array]:
+    begins_m = np.concatenate([[0.0], taught.ends_m[:-1]])
+    return [
+        taught.path.at(np.linspace(begin, end, max(2, int((end - begin) / _SAMPLE_M) + 1)))
+        for begin, end in zip(begins_m, taught.ends_m, strict=True)
+    ]
+
+
+def _normal(points: Array) -> Array:
+    """Unit normal of the plane a curve lies in, or of one it lies in if it is a line."""
+    normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][-1]
+    return np.asarray(normal)
