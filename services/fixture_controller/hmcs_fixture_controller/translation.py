@@ -6,14 +6,14 @@ import numpy as np
 
 from hmcs.bus.messages import Belief, Command, FixtureState, Motion
 from hmcs.fixtures.controller import Fixture, Guides, OperatorSample
-from hmcs.fixtures.rules import likely_successors, rules_of
+from hmcs.fixtures.rules import rules_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.recognition.model import Model
 
 
 def guides_of(model: Model) -> Guides:
     """Return the paths a model learned and the rules of its task."""
-    return Guides(model.paths, rules_of(model.task), likely_successors(model.task))
+    return Guides(model.paths, rules_of(model.task))
 
 
 def sample_of(motion: Motion, seq: int) -> OperatorSample:

@@ -59,6 +59,8 @@ def task(name: str) -> Task:
                 "tool_start_m": [0.6, 0.0, 0.5],
                 "tool_orientation_xyzw": [0.0, 0.0, 0.0, 1.0],
             },
+            # The hand of these tests goes across the path all the time.
+            "fixture": {"compliance": "belief", "maximum_factor": 0.8, "tremor": "none"},
         }
     )
 

@@ -196,10 +196,10 @@ class FixtureSetup(Part):
 
     law: Literal["general", "thesis"] = "general"
     """`general` is (2.29), `thesis` is (3.6)."""
-    compliance: Literal["belief", "insistence"] = "belief"
+    compliance: Literal["belief", "insistence"] = "insistence"
     """What softens the fixture: `belief` is (3.2), the less sure the softer; `insistence` lets go
     besides of an operator whose hand keeps going across the guide."""
-    maximum_factor: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.8
+    maximum_factor: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.83
     """ξ of (3.6): the fixturing factor when the recognition is certain."""
     gain_rise_per_s: Positive = 6.0
     gain_fall_per_s: Positive = 16.0
@@ -210,15 +210,12 @@ class FixtureSetup(Part):
     the general law; 0 for none."""
     pull_full_at_m: Positive = 0.02
     """A robot so far from the path is led back with full strength."""
-    pull_reach_m: Positive = 0.06
+    pull_reach_m: Positive = 0.025
     """Much farther than this a path counts as left, and leads nobody back."""
-    shift_beyond_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    shift_beyond_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.006
     """A path goes on from where the one before it ended, if the robot is no farther beside it than
     this when its segment begins; otherwise it is laid at the robot. 0 lays it there always."""
-    look_ahead: bool = False
-    """Whether a path goes on into the one that most likely follows it, so that the fixture turns
-    with the hand before the next state is recognized."""
-    tremor: Literal["none", "notch"] = "none"
+    tremor: Literal["none", "notch"] = "notch"
     """How tremor is taken out of the operator's velocity: a notch lets nothing pass at its
     center."""
     tremor_hz: Positive = 10.0

@@ -6,7 +6,6 @@ first-order lag of its tool's velocity.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.fixtures.controller import Controller, Fixture, Guides, OperatorSample
-from hmcs.fixtures.rules import Rules, Safeguards, likely_successors
+from hmcs.fixtures.rules import Rules, Safeguards
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
@@ -75,7 +74,7 @@ def perform(
 ) -> Run:
     """Return how an operator performs a task from `start`, m, shape (3,), under these rules."""
     controller = Controller(Safeguards())
-    controller.load(model.name, Guides(model.paths, rules, likely_successors(model.task)))
+    controller.load(model.name, Guides(model.paths, rules))
     controller.activate(model.name)
     recognizer = recognizer_of(model)
     zone = DeadZone(model.task.dead_zone_m)
@@ -169,9 +168,3 @@ def passed_by(fixture: Fixture, velocity: Array) -> Array:
     """Return what the fixture's law makes of another velocity, m/s, shape (3,)."""
     twist = np.concatenate([velocity, np.zeros(3)])
     return np.asarray(fixture.objective.wanted(twist)[:3])
-
-
-def mean_of(runs: Sequence[float]) -> float:
-    """Return the mean of what could be measured; NaN where nothing could."""
-    known = [value for value in runs if not np.isnan(value)]
-    return float(np.mean(known)) if known else float("nan")

@@ -7,6 +7,7 @@ else.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def taught_lines(rng: np.random.Generator, dead_zone_m: float) -> Taught:
     del rng
     task = load_task("lines-through-obstacles").model_copy(update={"dead_zone_m": dead_zone_m})
     corners = read_csv(find_task("lines-through-obstacles").with_suffix(".csv")).positions
-    return _taught(task, list(zip(corners[:-1], corners[1:], strict=True)))
+    return _taught(task, list(pairwise(corners)))
 
 
 def taught_curves(rng: np.random.Generator, dead_zone_m: float) -> Taught:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hmcs_laboratory.studies.assistance import ASSISTANCE
 from hmcs_laboratory.studies.calibration import CALIBRATION
 from hmcs_laboratory.studies.directions import DIRECTIONS
 from hmcs_laboratory.studies.drawings import LASA
@@ -37,4 +38,5 @@ STUDIES: tuple[Study[Any], ...] = (
     DIRECTIONS,
     UNKNOWN,
     CALIBRATION,
+    ASSISTANCE,
 )
