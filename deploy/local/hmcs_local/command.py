@@ -299,9 +299,11 @@ def check(
     file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],
 ) -> None:
     """Name every problem of a task file, with line and field; exit code 2 where there is one."""
+    from hmcs.fixtures.workspace import check_workspace
     from hmcs.task import load_task
 
     task = load_task(file)
+    check_workspace(file, task)
     typer.echo(f"{file}: in order: {len(task.gestemes)} gestemes, {len(task.states)} states")
 
 

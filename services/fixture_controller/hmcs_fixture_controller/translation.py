@@ -8,12 +8,16 @@ from hmcs.bus.messages import Belief, Command, FixtureState, Motion
 from hmcs.fixtures.controller import Fixture, Guides, OperatorSample
 from hmcs.fixtures.rules import rules_of
 from hmcs.fixtures.trust import SegmentBelief
+from hmcs.fixtures.workspace import regions_of
 from hmcs.recognition.model import Model
 
 
 def guides_of(model: Model) -> Guides:
-    """Return the paths a model learned and the rules of its task."""
-    return Guides(model.paths, rules_of(model.task))
+    """Return the paths a model learned, and the rules and forbidden regions of its task.
+
+    Raises RegionError for a region that cannot be.
+    """
+    return Guides(model.paths, rules_of(model.task), regions_of(model.task))
 
 
 def sample_of(motion: Motion, seq: int) -> OperatorSample:

@@ -36,8 +36,11 @@ MEASURES = {
     *TIMINGS,
 }
 
+OF_METHODS = [study for study in STUDIES if "methods" in study.settings.model_fields]
+"""All but those of assistance, which have tests of their own."""
 
-@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+
+@pytest.mark.parametrize("study", OF_METHODS, ids=lambda study: study.name)
 def test_a_trial_measures_every_method_with_tiny_settings(study):
     settings = study.settings_from([f"{name}={value}" for name, value in study.tiny.items()])
     rows = study.trial(settings, np.random.default_rng(3))
@@ -63,7 +66,7 @@ def test_every_setting_is_explained_and_every_study_has_a_source(study):
         assert known.description or name in undocumented, name
 
 
-@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+@pytest.mark.parametrize("study", OF_METHODS, ids=lambda study: study.name)
 def test_a_method_measures_the_same_alone_and_among_others(study):
     def rows(methods):
         given = {**study.tiny, "methods": methods}

@@ -27,7 +27,7 @@ class Wander:
         """Return the next value, shape (3,)."""
         fresh = self._rms * np.sqrt(1.0 - self._keep**2)
         self._value = self._keep * self._value + fresh * self._rng.standard_normal(3)
-        return self._value
+        return np.asarray(self._value)
 
 
 class Tremor:

@@ -43,3 +43,18 @@ def continuous(quaternions: ArrayLike) -> FloatArray:
     flips = (given[1:] * given[:-1]).sum(axis=1) < 0
     turned = np.concatenate([[False], np.logical_xor.accumulate(flips)])[: len(given)]
     return np.where(turned[:, None], -given, given)
+
+
+def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
+    """Return the rotation of a unit quaternion x y z w as a matrix, shape (3, 3).
+
+    Raises ValueError as `unit_quaternion` does.
+    """
+    x, y, z, w = unit_quaternion(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -11,6 +11,7 @@ from hmcs.task.file import (
     find_task,
     format_problems,
     load_task,
+    problem_at,
     shipped_tasks,
 )
 from hmcs.task.model import Task
@@ -18,6 +19,7 @@ from hmcs.task.parts import (
     AXES,
     Drawings,
     FixtureSetup,
+    ForbiddenRegion,
     Gesteme,
     Obstacle,
     Recognition,
@@ -30,6 +32,7 @@ __all__ = [
     "AXES",
     "Drawings",
     "FixtureSetup",
+    "ForbiddenRegion",
     "Gesteme",
     "Obstacle",
     "Problem",
@@ -43,5 +46,6 @@ __all__ = [
     "find_task",
     "format_problems",
     "load_task",
+    "problem_at",
     "shipped_tasks",
 ]

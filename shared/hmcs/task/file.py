@@ -11,7 +11,15 @@ from pydantic_core import ErrorDetails
 
 from hmcs.errors import UserError
 from hmcs.task.model import Draft, Location, Task, contradictions, unknown
-from hmcs.task.parts import Distribution, Gesteme, Obstacle, RobotSetup, State, Workspace
+from hmcs.task.parts import (
+    Distribution,
+    ForbiddenRegion,
+    Gesteme,
+    Obstacle,
+    RobotSetup,
+    State,
+    Workspace,
+)
 from hmcs.task.yaml_lines import Document, YamlError, read_yaml
 
 T = TypeVar("T")
@@ -44,10 +52,11 @@ def load_task(path_or_name: str | Path) -> Task:
 
     Raises TaskFileError listing every mistake of the file with its line and field.
     """
-    task, problems = _read(find_task(path_or_name))
+    file = find_task(path_or_name)
+    task, problems = _read(file)
     if task is None:
         raise TaskFileError(problems)
-    return task
+    return _with_files_beside(task, file.parent)
 
 
 def check_task(path_or_name: str | Path) -> list[Problem]:
@@ -56,6 +65,13 @@ def check_task(path_or_name: str | Path) -> list[Problem]:
         return _read(find_task(path_or_name))[1]
     except TaskFileError as error:
         return error.problems
+
+
+def problem_at(path_or_name: str | Path, location: Location, message: str) -> Problem:
+    """Return a mistake that stands at a field of a task file, with its line."""
+    file = find_task(path_or_name)
+    document = read_yaml(file.read_text(encoding="utf-8-sig"))
+    return Problem(str(file), _line(document, location), _dotted(location), message)
 
 
 def format_problems(problems: list[Problem]) -> str:
@@ -81,6 +97,20 @@ def find_task(path_or_name: str | Path) -> Path:
     names = ", ".join(shipped_tasks())
     message = f"{what}, expected a task file or one of the shipped tasks (choose of: {names})"
     raise TaskFileError([Problem(str(path_or_name), 1, "", message)])
+
+
+def _with_files_beside(task: Task, folder: Path) -> Task:
+    """Return the task with the files that it names as absolute paths."""
+    if all(region.file is None for region in task.workspace.forbidden):
+        return task
+    forbidden = tuple(
+        region
+        if region.file is None
+        else region.model_copy(update={"file": str((folder / region.file).resolve())})
+        for region in task.workspace.forbidden
+    )
+    workspace = task.workspace.model_copy(update={"forbidden": forbidden})
+    return task.model_copy(update={"workspace": workspace})
 
 
 def _shipped_folder() -> Path:
@@ -130,9 +160,10 @@ def _draft(data: dict[Any, Any]) -> Draft:
         states,
         _valid(Distribution, data.get("start")),
         _each(Obstacle, box.get("obstacles"))[0],
-        _valid(Workspace, {**box, "obstacles": ()}),
+        _valid(Workspace, {**box, "obstacles": (), "forbidden": ()}),
         _valid(RobotSetup, data.get("robot")),
         complete=gestemes_right and states_right,
+        forbidden=_each(ForbiddenRegion, box.get("forbidden"))[0],
     )
 
 

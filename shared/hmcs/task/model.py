@@ -12,6 +12,7 @@ from hmcs.task.parts import (
     Distribution,
     Drawings,
     FixtureSetup,
+    ForbiddenRegion,
     Gesteme,
     Name,
     Obstacle,
@@ -56,6 +57,7 @@ class Task(Part):
                 list(enumerate(self.workspace.obstacles)),
                 self.workspace,
                 self.robot,
+                forbidden=list(enumerate(self.workspace.forbidden)),
             )
         )
         if found:
@@ -82,6 +84,7 @@ class Draft(NamedTuple):
     robot: RobotSetup | None
     complete: bool = True
     """False where gestemes or states are missing from it: names may then be among those."""
+    forbidden: Sequence[tuple[int, ForbiddenRegion]] = ()
 
 
 class Contradiction(NamedTuple):
@@ -105,6 +108,7 @@ def contradictions(draft: Draft) -> list[Contradiction]:
         *_repeated(("gestemes",), draft.gestemes),
         *_repeated(("states",), draft.states),
         *_repeated(("workspace", "obstacles"), draft.obstacles),
+        *_repeated(("workspace", "forbidden"), draft.forbidden),
     ]
     if draft.workspace is not None and draft.robot is not None:
         found += _outside(draft.workspace, draft.robot)
@@ -116,7 +120,7 @@ def contradictions(draft: Draft) -> list[Contradiction]:
 
 
 def _repeated(
-    field: Location, parts: Sequence[tuple[int, Gesteme | State | Obstacle]]
+    field: Location, parts: Sequence[tuple[int, Gesteme | State | Obstacle | ForbiddenRegion]]
 ) -> Iterator[Contradiction]:
     seen: set[str] = set()
     for index, part in parts:

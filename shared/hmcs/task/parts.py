@@ -151,12 +151,59 @@ class Obstacle(Part):
         return self
 
 
+class ForbiddenRegion(Part):
+    """Where the fixture never lets the tool go, base frame."""
+
+    name: Name
+    shape: Literal["plane", "sphere", "box", "capsule", "mesh"]
+    position_m: Point
+    """On a plane; of the center of a sphere or a box; where a capsule begins; of a mesh's origin.
+    """
+    orientation_xyzw: Rotation = (0.0, 0.0, 0.0, 1.0)
+    """Of a box or a mesh."""
+    normal: Point | None = None
+    """Of a plane: points to where the tool may be."""
+    size_m: tuple[Positive, Positive, Positive] | None = None
+    """Full lengths of a box along its x, y, z."""
+    radius_m: Positive | None = None
+    """Of a sphere or a capsule."""
+    end_m: Point | None = None
+    """Where a capsule ends."""
+    file: str | None = None
+    """STL or OBJ file of a mesh; beside the task file where it is no absolute path."""
+    scale: Positive | None = None
+    """m for a unit of the mesh, 1 by default."""
+
+    @model_validator(mode="after")
+    def _has_its_measures(self) -> Self:
+        wanted = {
+            "plane": {"normal"},
+            "sphere": {"radius_m"},
+            "box": {"size_m"},
+            "capsule": {"end_m", "radius_m"},
+            "mesh": {"file"},
+        }[self.shape]
+        optional = {"scale"} if self.shape == "mesh" else set()
+        measures = ("normal", "size_m", "radius_m", "end_m", "file", "scale")
+        given = {measure for measure in measures if getattr(self, measure) is not None}
+        if wanted - given:
+            raise ValueError(f"a {self.shape} needs {' and '.join(sorted(wanted - given))}")
+        if given - wanted - optional:
+            needless = " and no ".join(sorted(given - wanted - optional))
+            raise ValueError(f"a {self.shape} has no {needless}")
+        if self.normal is not None and not any(self.normal):
+            raise ValueError("normal is [0, 0, 0], expected a direction")
+        return self
+
+
 class Workspace(Part):
     """Where the robot's tool may be, base frame."""
 
     lower_m: Point
     upper_m: Point
     obstacles: tuple[Obstacle, ...] = ()
+    forbidden: tuple[ForbiddenRegion, ...] = ()
+    """What the fixture keeps the tool out of; it slides along them."""
 
     @model_validator(mode="after")
     def _is_a_box(self) -> Self:
@@ -187,6 +234,8 @@ class RobotSetup(Part):
     """Position of the tool at the start of the task, base frame."""
     tool_orientation_xyzw: Rotation
     """Of the tool, base frame; kept during the task."""
+    tool_radius_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    """The tool is kept out of forbidden regions as a ball of this size about its tip."""
     speed_limit_m_s: Positive = 0.25
     angular_speed_limit_rad_s: Positive = 0.5
 

@@ -117,15 +117,22 @@ def perform(
         states.append(state)
         velocity = velocity + follow * (fixture.command_twist[:3] - velocity)
         tool = tool + velocity * period_s
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    robot_at, hand_velocity, intended, command, passed, force, told = (
+        np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)
+    )
     return Run(
-        period_s,
-        arrived,
-        *columns[:6],
-        columns[6][:, 0],
-        columns[6][:, 1],
-        tuple(states),
-        columns[6][:, 2],
+        period_s=period_s,
+        arrived=arrived,
+        robot=robot_at,
+        hand_velocity=hand_velocity,
+        intended=intended,
+        command=command,
+        passed=passed,
+        force=force,
+        progress_m=told[:, 0],
+        factor=told[:, 1],
+        states=tuple(states),
+        confidence=told[:, 2],
     )
 
 
@@ -144,7 +151,7 @@ def demonstrated(
         progress_m = max(progress_m, motion.progress_m)
         positions.append(here)
         states.append(taught.state_at(progress_m))
-    time_s = period_s * np.arange(len(positions))
+    time_s = period_s * np.arange(len(positions), dtype=np.float64)
     return Demonstration(name, time_s, np.array(positions), tuple(states))
 
 

@@ -61,6 +61,7 @@ class AssistanceSettings(StudySettings):
     dead_zone_m: Positive = 0.005
     """Of the recognizer."""
     rate_hz: Positive = 100.0
+    """Samples of the hand and ticks of the fixture a second."""
     robot_lag_s: NotNegative = 0.03
     """Time constant of the simulated robot."""
 
