@@ -29,6 +29,7 @@ def sample_of(motion: Motion, seq: int) -> OperatorSample:
         twist=np.concatenate([motion.velocity, angular]),
         dead_man=motion.dead_man,
         clutch=motion.clutch,
+        pedal=motion.pedal,
     )
 
 

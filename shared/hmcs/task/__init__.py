@@ -14,11 +14,10 @@ from hmcs.task.file import (
     problem_at,
     shipped_tasks,
 )
+from hmcs.task.fixture_parts import FixtureSetup
 from hmcs.task.model import Task
 from hmcs.task.parts import (
-    AXES,
     Drawings,
-    FixtureSetup,
     ForbiddenRegion,
     Gesteme,
     Obstacle,
@@ -27,6 +26,7 @@ from hmcs.task.parts import (
     State,
     Workspace,
 )
+from hmcs.task.values import AXES
 
 __all__ = [
     "AXES",

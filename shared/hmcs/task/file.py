@@ -12,7 +12,6 @@ from pydantic_core import ErrorDetails
 from hmcs.errors import UserError
 from hmcs.task.model import Draft, Location, Task, contradictions, unknown
 from hmcs.task.parts import (
-    Distribution,
     ForbiddenRegion,
     Gesteme,
     Obstacle,
@@ -20,6 +19,7 @@ from hmcs.task.parts import (
     State,
     Workspace,
 )
+from hmcs.task.values import Distribution
 from hmcs.task.yaml_lines import Document, YamlError, read_yaml
 
 T = TypeVar("T")

@@ -8,20 +8,18 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
+from hmcs.task.fixture_parts import FixtureSetup
 from hmcs.task.parts import (
-    Distribution,
     Drawings,
-    FixtureSetup,
     ForbiddenRegion,
     Gesteme,
-    Name,
     Obstacle,
-    Part,
     Recognition,
     RobotSetup,
     State,
     Workspace,
 )
+from hmcs.task.values import Distribution, Name, Part
 
 Location = tuple[str | int, ...]
 
