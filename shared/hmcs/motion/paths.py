@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,18 @@ FloatArray = NDArray[np.float64]
 
 _TIE = 1e-9
 """Distances that differ by less than this share of the path's length count as equal."""
+
+
+class _Pieces(NamedTuple):
+    """The straight pieces of a path, those of no length left out."""
+
+    first: FloatArray
+    """Where each begins, m, shape (k, 3)."""
+    directions: FloatArray
+    """Unit length, shape (k, 3)."""
+    starts: FloatArray
+    ends: FloatArray
+    """Arc lengths, m, shape (k,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +38,7 @@ class Path:
     """m, shape (K, 3)."""
     arc_length: FloatArray = field(init=False)
     """Length of the path up to each point, m, shape (K,); begins with 0."""
+    _pieces: _Pieces = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)
@@ -38,6 +52,7 @@ class Path:
         points.flags.writeable = arc_length.flags.writeable = False
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "arc_length", arc_length)
+        object.__setattr__(self, "_pieces", _pieces_of(points, arc_length))
 
     @property
     def length_m(self) -> float:
@@ -49,10 +64,11 @@ class Path:
 
         Before the first and after the last point the path stands still.
         """
-        s = np.asarray(arc_length, dtype=float)
-        return np.stack(
-            [np.interp(s, self.arc_length, self.points[:, axis]) for axis in range(3)], axis=-1
-        )
+        pieces = self._pieces
+        s = np.minimum(np.maximum(arc_length, 0.0), pieces.ends[-1])
+        piece = np.searchsorted(pieces.starts, s, side="right") - 1
+        beyond = (s - pieces.starts[piece])[..., None]
+        return np.asarray(pieces.first[piece] + beyond * pieces.directions[piece])
 
     def tangent(self, arc_length: float, reach_m: float = 0.0) -> FloatArray:
         """Return the unit direction of travel at an arc length, shape (3,).
@@ -62,15 +78,13 @@ class Path:
         """
         s = min(max(float(arc_length), 0.0), self.length_m)
         if reach_m > 0:
-            chord = self.at(s + reach_m) - self.at(s - reach_m)
-            length_m = np.linalg.norm(chord)
+            behind, ahead = self.at((s - reach_m, s + reach_m))
+            chord = ahead - behind
+            length_m = np.sqrt(chord @ chord)
             if length_m > 0:
                 return np.asarray(chord / length_m)
-        behind = int(np.searchsorted(self.arc_length, s, side="right")) - 1
-        if self.arc_length[behind] == self.length_m:
-            behind = int(np.searchsorted(self.arc_length, self.length_m, side="left")) - 1
-        piece = self.points[behind + 1] - self.points[behind]
-        return np.asarray(piece / np.linalg.norm(piece))
+        piece = int(np.searchsorted(self._pieces.starts, s, side="right")) - 1
+        return self._pieces.directions[piece]
 
     def project(
         self, point: ArrayLike, near: float | None = None, window_m: float | None = None
@@ -85,16 +99,19 @@ class Path:
         if near is not None and window_m is not None:
             lower = min(max(near - window_m, 0.0), self.length_m)
             upper = max(min(near + window_m, self.length_m), lower)
-        starts = self.arc_length[:-1]
-        lengths = np.diff(self.arc_length)
-        inside = (starts <= upper) & (self.arc_length[1:] >= lower) & (lengths > 0)
-        first, starts, lengths = self.points[:-1][inside], starts[inside], lengths[inside]
-        direction = (self.points[1:][inside] - first) / lengths[:, None]
-        along = np.einsum("kd,kd->k", np.asarray(point, dtype=float) - first, direction)
-        along = np.clip(along, 0.0, lengths)
-        along = np.clip(along, lower - starts, upper - starts)
-        closest = first + along[:, None] * direction
-        distance = np.linalg.norm(closest - np.asarray(point, dtype=float), axis=1)
+        pieces = self._pieces
+        inside = slice(
+            np.searchsorted(pieces.ends, lower, side="left"),
+            np.searchsorted(pieces.starts, upper, side="right"),
+        )
+        first, starts = pieces.first[inside], pieces.starts[inside]
+        directions = pieces.directions[inside]
+        beside = np.asarray(point, dtype=float) - first
+        along = (beside * directions).sum(axis=1)
+        along = np.minimum(np.maximum(along, 0.0), pieces.ends[inside] - starts)
+        along = np.minimum(np.maximum(along, lower - starts), upper - starts)
+        beside -= along[:, None] * directions
+        distance = np.sqrt((beside * beside).sum(axis=1))
         s = starts + along
         if near is None:
             return float(s[distance.argmin()])
@@ -138,3 +155,11 @@ def mean_path(paths: Sequence[ArrayLike], count: int = 100) -> tuple[FloatArray,
 def _arc_length(points: FloatArray) -> FloatArray:
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(pieces)]) if len(points) else pieces
+
+
+def _pieces_of(points: FloatArray, arc_length: FloatArray) -> _Pieces:
+    steps = np.diff(points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    long = np.diff(arc_length) > 0
+    directions = steps[long] / lengths[long, None]
+    return _Pieces(points[:-1][long], directions, arc_length[:-1][long], arc_length[1:][long])
