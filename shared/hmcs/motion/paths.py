@@ -84,7 +84,7 @@ class Path:
             if length_m > 0:
                 return np.asarray(chord / length_m)
         piece = int(np.searchsorted(self._pieces.starts, s, side="right")) - 1
-        return self._pieces.directions[piece]
+        return np.asarray(self._pieces.directions[piece])
 
     def project(
         self, point: ArrayLike, near: float | None = None, window_m: float | None = None

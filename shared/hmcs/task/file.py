@@ -10,6 +10,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from hmcs.errors import UserError
+from hmcs.task.fixture_parts import FixtureSetup
 from hmcs.task.model import Draft, Location, Task, contradictions, unknown
 from hmcs.task.parts import (
     ForbiddenRegion,
@@ -164,6 +165,8 @@ def _draft(data: dict[Any, Any]) -> Draft:
         _valid(RobotSetup, data.get("robot")),
         complete=gestemes_right and states_right,
         forbidden=_each(ForbiddenRegion, box.get("forbidden"))[0],
+        dead_zone_m=_valid(float, data.get("dead_zone_m")),
+        fixture=_valid(FixtureSetup, data.get("fixture") or {}),
     )
 
 

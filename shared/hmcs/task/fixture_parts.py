@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -52,6 +53,30 @@ class VirtualToolSetup(Part):
     stiffness_n_per_m: NotNegative = 0.0
 
 
+class VolumeKnot(Part):
+    """The radius of a volume at a place of its path."""
+
+    progress: Share
+    """Share of the path's length."""
+    radius_m: NotNegative
+
+
+class VolumeSetup(Part):
+    """A tube (one knot), a cone (two), or several joined, along the learned path."""
+
+    knots: Annotated[tuple[VolumeKnot, ...], Field(min_length=1)]
+    """By rising progress."""
+    wall_m: Positive = 0.005
+    """Over so much beyond the radius the fixture becomes as stiff as it gets."""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        places = [knot.progress for knot in self.knots]
+        if any(after <= before for before, after in pairwise(places)):
+            raise ValueError(f"knots are at {places}, expected rising progress")
+        return self
+
+
 class StateFixture(Part):
     """What one state's fixture does otherwise than the task's."""
 
@@ -62,6 +87,7 @@ class StateFixture(Part):
     optimal: OptimalCompliance | None = None
     cue: Cue | None = None
     pull: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = None
+    volume: VolumeSetup | None = None
 
 
 class FixtureSetup(Part):
@@ -80,6 +106,9 @@ class FixtureSetup(Part):
     """Lines of `optimal`, which needs them."""
     cue: Cue = Cue()
     """Of `cue`."""
+    volume: VolumeSetup | None = None
+    """Within it the fixture is free, and it brings back who leaves; none makes the path the guide.
+    """
     maximum_factor: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.83
     """ξ of (3.6): the fixturing factor when the recognition is certain."""
     gain_rise_per_s: Positive = 6.0

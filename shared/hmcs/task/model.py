@@ -8,7 +8,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from hmcs.task.fixture_parts import FixtureSetup
+from hmcs.task.fixture_parts import FixtureSetup, VolumeSetup
 from hmcs.task.parts import (
     Drawings,
     ForbiddenRegion,
@@ -56,6 +56,8 @@ class Task(Part):
                 self.workspace,
                 self.robot,
                 forbidden=list(enumerate(self.workspace.forbidden)),
+                dead_zone_m=self.dead_zone_m,
+                fixture=self.fixture,
             )
         )
         if found:
@@ -83,6 +85,8 @@ class Draft(NamedTuple):
     complete: bool = True
     """False where gestemes or states are missing from it: names may then be among those."""
     forbidden: Sequence[tuple[int, ForbiddenRegion]] = ()
+    dead_zone_m: float | None = None
+    fixture: FixtureSetup | None = None
 
 
 class Contradiction(NamedTuple):
@@ -110,6 +114,7 @@ def contradictions(draft: Draft) -> list[Contradiction]:
     ]
     if draft.workspace is not None and draft.robot is not None:
         found += _outside(draft.workspace, draft.robot)
+    found += _narrow_volumes(draft)
     if draft.complete:
         strangers = list(_unknown_names(draft))
         # A misspelled name hides a way; what can be reached is told once the names are right.
@@ -168,6 +173,27 @@ def _unreachable(draft: Draft) -> Iterator[Contradiction]:
                 ("states", index, "name"),
                 f"state {state.name!r} can never be reached: name it in start, or in next of a "
                 "state that can",
+            )
+
+
+def _narrow_volumes(draft: Draft) -> Iterator[Contradiction]:
+    """Where a volume is narrower than what counts as motion at all."""
+    places: list[tuple[Location, VolumeSetup | None]] = [
+        (("states", index, "fixture", "volume"), state.fixture.volume)
+        for index, state in draft.states
+        if state.fixture is not None
+    ]
+    if draft.fixture is not None:
+        places.insert(0, (("fixture", "volume"), draft.fixture.volume))
+    for location, volume in places:
+        if volume is None or draft.dead_zone_m is None:
+            continue
+        widest_m = max(knot.radius_m for knot in volume.knots)
+        if widest_m < draft.dead_zone_m:
+            yield Contradiction(
+                location,
+                f"radius is {widest_m:g} m at most, below dead_zone_m ({draft.dead_zone_m:g}): "
+                "within it nothing is recognized; make it wider, or leave volume out",
             )
 
 

@@ -332,3 +332,23 @@ def test_an_obstacle_has_the_measures_of_its_shape(
     data = {"name": "o", "shape": shape, "position_m": (0, 0, 0), **measures}
     with pytest.raises(ValidationError, match=said):
         TypeAdapter(Obstacle).validate_python(data)
+
+
+@pytest.mark.parametrize(
+    ("fixture", "says"),
+    [
+        ("volume: {knots: [{progress: 0, radius_m: 0.002}]}", "below dead_zone_m"),
+        (
+            "volume: {knots: [{progress: 0.5, radius_m: 0.1}, {progress: 0.2, radius_m: 0.1}]}",
+            "rising",
+        ),
+        ("compliance: optimal", "no lines"),
+        ("law: soft", "general"),
+    ],
+)
+def test_a_fixture_that_cannot_be_is_told_with_its_line(
+    check: Check, fixture: str, says: str
+) -> None:
+    (problem,) = check(f"{GOOD}fixture:\n  {fixture}\n")
+    assert says in problem.message
+    assert problem.line >= GOOD.count("\n")
