@@ -95,6 +95,7 @@ class FixtureController(Service):
             doing = "idle: no operator input"
         else:
             doing = f"{fixture.reason}, {fixture.law} law, factor {fixture.factor:.2f}"
+            doing += "; its plan is stuck and asks for help" if fixture.asks_for_help else ""
         stands = f"; {robot.robot} stands: {robot.stop}" if robot and robot.stop != "none" else ""
         return True, f"{doing}; follows {self._controller.active or 'no model'}{stands}"
 
@@ -141,6 +142,8 @@ class FixtureController(Service):
         self._states.put(state_of(fixture), origin)
         if self._fixture is None or self._fixture.engaged != fixture.engaged:
             self.log.info("engaged" if fixture.engaged else f"not engaged: {fixture.reason}")
+        if fixture.asks_for_help and (self._fixture is None or not self._fixture.asks_for_help):
+            self.log.warning("a plan is stuck: help it on", extra={"state": fixture.state})
         self._fixture = fixture
 
     # --- the slow loop ----------------------------------------------------------------------------
@@ -217,7 +220,10 @@ class FixtureController(Service):
 
     def _on_robot_state(self, received: Received[RobotState]) -> None:
         self._robot = received.body
-        self._controller.robot_moved(received.received_ns / NS_PER_S, received.body.tool_position)
+        robot = received.body
+        self._controller.robot_moved(
+            received.received_ns / NS_PER_S, robot.tool_position, robot.tool_orientation
+        )
 
     def _model_of(self, recognizer: str, model_hash: str) -> Model | None:
         """The model of that recognizer; one of another name may stand on any loaded model."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hmcs.task.values import NotNegative, Number, Part, Positive, Share
+from hmcs.task.values import NotNegative, Number, Part, Point, Positive, Rotation, Share
 
 ComplianceName = Literal["belief", "insistence", "fixed", "optimal", "cue"]
 
@@ -77,6 +77,51 @@ class VolumeSetup(Part):
         return self
 
 
+class TargetSetup(Part):
+    """A pose the operator is guided to instead of along the path (2.30)."""
+
+    position_m: Point
+    """Of the tool, base frame."""
+    orientation_xyzw: Rotation | None = None
+    """Any where it is left out."""
+    sphere_m: Positive = 0.008
+    """Within so much of the target the direction stays as it was."""
+
+
+class PlanSetup(Part):
+    """The robot goes along the learned path by itself, and the operator has the last word."""
+
+    speed_m_s: Positive = 0.05
+    """While the operator does nothing."""
+    fastest: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 2.0
+    """An operator may speed it up to so many times that."""
+    return_per_s: Positive = 1.0
+    """A robot pushed aside comes back by this share of the distance a second."""
+    aside_within_m: Positive = 0.1
+    """Farther aside than this the plan waits for the operator."""
+    slows_within_m: Positive = 0.02
+    """It slows down so long before its end."""
+
+
+class SharedSetup(Part):
+    """Who moves which axis while an operator helps a plan on."""
+
+    operator_axes: Annotated[
+        tuple[Literal["vx", "vy", "vz", "wx", "wy", "wz"], ...], Field(min_length=1)
+    ]
+    """The operator's, base frame; the others stay the plan's."""
+    stuck_after_s: Positive = 1.0
+    """A plan that has not moved for so long asks for help."""
+    hands_back_after_s: Positive = 0.5
+    """Once the hand rests so long the plan has all axes again."""
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        if len(set(self.operator_axes)) < len(self.operator_axes):
+            raise ValueError(f"axes are {', '.join(self.operator_axes)}, expected each once")
+        return self
+
+
 class StateFixture(Part):
     """What one state's fixture does otherwise than the task's."""
 
@@ -88,6 +133,17 @@ class StateFixture(Part):
     cue: Cue | None = None
     pull: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = None
     volume: VolumeSetup | None = None
+    target: TargetSetup | None = None
+    plan: PlanSetup | None = None
+    shared: SharedSetup | None = None
+
+    @model_validator(mode="after")
+    def _shares_a_plan(self) -> Self:
+        if self.shared is not None and self.plan is None:
+            raise ValueError("shared axes need a plan to share them with: give plan")
+        if self.target is not None and self.plan is not None:
+            raise ValueError("target and plan lead differently: give one of them")
+        return self
 
 
 class FixtureSetup(Part):

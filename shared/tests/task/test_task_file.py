@@ -352,3 +352,31 @@ def test_a_fixture_that_cannot_be_is_told_with_its_line(
     (problem,) = check(f"{GOOD}fixture:\n  {fixture}\n")
     assert says in problem.message
     assert problem.line >= GOOD.count("\n")
+
+
+@pytest.mark.parametrize(
+    ("fixture", "says"),
+    [
+        ("shared: {operator_axes: [vx]}", "need a plan"),
+        ("plan: {}, shared: {operator_axes: [vx, vx]}", "each once"),
+        ("plan: {}, target: {position_m: [0, 0, 0.5]}", "give one of them"),
+        ("volume: {knots: []}", "at least 1"),
+    ],
+)
+def test_a_states_fixture_that_contradicts_itself_is_told(
+    check: Check, fixture: str, says: str
+) -> None:
+    text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{fixture}}}")
+    (problem,) = check(text)
+    assert says in problem.message
+    assert problem.path.startswith("states[0].fixture")
+
+
+def test_a_state_may_go_by_a_plan_or_to_a_target(check: Check) -> None:
+    for fixture in (
+        "plan: {speed_m_s: 0.03}, shared: {operator_axes: [vx, wz]}",
+        "target: {position_m: [0, 0, 0.5], orientation_xyzw: [0, 0, 0, 1]}",
+        "compliance: cue, cue: {cue: pedal, scaling: hold}",
+    ):
+        text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{fixture}}}")
+        assert check(text) == []
