@@ -110,3 +110,49 @@ def test_with_recognition_it_is_guided_along_the_way_of_the_hand(
     ]
     # The device samples the demonstration anew at its own rate: its steps are not quite these.
     assert np.mean(agree) > 0.95
+
+
+@pytest.mark.parametrize("guided", [False, True])
+def test_a_simulated_operator_closes_the_loop_through_the_bus(
+    stack: Stack, tmp_path: Path, model_file: Path, model: Model, guided: bool
+) -> None:
+    task = model.task
+    meant = model.paths[task.states[0].gestemes[0]].points + np.array(task.robot.tool_start_m)
+    rows = [f"{t},{x},{y},{z},{task.states[0].name}" for t, (x, y, z) in enumerate(meant)]
+    file = tmp_path / "meant.csv"
+    file.write_text("\n".join(["time_s,x_m,y_m,z_m,state", *rows]))
+    bus = stack.open_bus("observer", "o")
+    stack.watch(bus)
+    watcher = Watcher(bus)
+    recognizers = ()
+    if guided:
+        recognizers = (
+            stack.start("gesteme_classifier", "a", "--model", model_file),
+            stack.start("task_hmm", "t", "--model", model_file, "--deadline-ms", 80),
+        )
+    models = json.dumps([str(model_file)] if guided else [])
+    stack.until_ready(
+        stack.start("robot", "r", "--hang-s", 0.5),
+        stack.start("fixture_controller", "f", "--models", models, *PATIENT),
+        *recognizers,
+    )
+    stack.bring_up(
+        "input_device",
+        "i",
+        *("--source", "simulated", "--operator", "steady", "--demonstration", file),
+        *("--lead-in-s", 0.5, "--wait-for", '["robot", "fixture_controller"]'),
+    )
+
+    def arrived() -> bool:
+        if not watcher.robot:
+            return False
+        tool = watcher.robot[-1].body.tool_position
+        return float(np.linalg.norm(tool - meant[-1])) < 0.012
+
+    stack.until(arrived)
+    tool = np.array([r.body.tool_position for r in watcher.robot])
+    off_m = [np.linalg.norm(meant - place, axis=1).min() for place in tool]
+    # The operator errs and the robot lags, but what is seen to go wrong is put right.
+    assert max(off_m) < 0.03
+    reasons = {r.body.reason for r in watcher.fixture if r.body.engaged}
+    assert ("guiding" in reasons) == guided

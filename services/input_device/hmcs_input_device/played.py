@@ -1,4 +1,4 @@
-"""The sources that come along: `recorded` plays a file, `synthetic` a simulated operator."""
+"""The sources that come along: a file that is played, and two kinds of simulated operators."""
 
 from __future__ import annotations
 
@@ -9,19 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.errors import UserError
+from hmcs.motion.closed_loop_operators import PRESETS, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration, read_csv
-from hmcs.motion.operators import Operator, OperatorStuckError, TaskSegment, perform
+from hmcs.motion.operators import Operator, OperatorStuckError, TaskSegment, joined, perform
+from hmcs.motion.paths import Path
 from hmcs.motion.references import References, random_gesteme, random_performance
 from hmcs.recognition.model_file import load_model
 from hmcs.task import AXES, Task
 from hmcs_input_device.playback import Passes, Playback
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
+from hmcs_input_device.simulated import Simulated
 from hmcs_input_device.sources import SourceFactory
 
 FloatArray = NDArray[np.float64]
 
 _SIMULATED_RATE_HZ = 100.0
+_SPACING_M = 0.002
 
 
 Played = Playback | ReEngaging
@@ -79,7 +83,29 @@ def synthetic(settings: InputDeviceSettings, task: Task) -> Played:
     return _played(settings, made)
 
 
-BUILT_IN: Mapping[str, SourceFactory] = {"recorded": recorded, "synthetic": synthetic}
+def simulated(settings: InputDeviceSettings, task: Task) -> Simulated:
+    """Return a source of an operator who sees the robot and steers it through the task.
+
+    What the operator means to do is as for `synthetic`. Raises UserError where that does not fit.
+    """
+    rng = np.random.default_rng(settings.seed)
+    meant, _ = joined([segment.points for segment in _meant(settings, task, rng)], _SPACING_M)
+    rate_hz = settings.rate_hz or _SIMULATED_RATE_HZ
+    path = Path(meant)
+    return Simulated(
+        ClosedLoopOperator(PRESETS[settings.operator], path, rng, period_s=1.0 / rate_hz),
+        rate_hz=rate_hz,
+        lead_in_s=settings.lead_in_s,
+        reach_m=float(np.linalg.norm(meant - meant[0], axis=1).max()),
+        reaction=Reaction(settings.reaction_s) if settings.re_engage else None,
+    )
+
+
+BUILT_IN: Mapping[str, SourceFactory] = {
+    "recorded": recorded,
+    "synthetic": synthetic,
+    "simulated": simulated,
+}
 """Sources that need no other distribution."""
 
 

@@ -16,7 +16,8 @@ class InputDeviceSettings(ServiceSettings):
     task: str = "human-shapes"
     """Name of a task that comes along, or path of a task file."""
     source: str = "synthetic"
-    """`recorded`, `synthetic`, or the name of a device that another distribution adds."""
+    """`recorded`, `synthetic`, `simulated`, or the name of a device that another distribution
+    adds."""
     dead_zone_m: float | None = Field(default=None, gt=0, le=0.2)
     """δ: the shortest motion that counts as a step; the task's by default."""
     steps_kept: int = Field(default=4096, ge=2000, le=10_000)
@@ -47,9 +48,12 @@ class InputDeviceSettings(ServiceSettings):
     """How long that operator sees the robot stand before letting go; the delay of eye and hand."""
 
     demonstration: Path | None = None
-    """CSV file: what `recorded` plays, and what the operator of `synthetic` means to do."""
+    """CSV file: what `recorded` plays, and what the operator of `synthetic` or `simulated` means
+    to do."""
     model: Path | None = None
-    """Model file whose learned paths the operator of `synthetic` means to follow."""
+    """Model file whose learned paths the operator of `synthetic` or `simulated` means to follow."""
+    operator: Literal["steady", "novice", "tremor", "hurried"] = "steady"
+    """Who it is that sees and steers the robot as `simulated`."""
     seed: int = Field(default=0, ge=0)
     """Of the simulated operator."""
     segments: int = Field(default=10, ge=1, le=10_000)
