@@ -41,6 +41,8 @@ def run_of(robot: np.ndarray, **changed: np.ndarray) -> Run:
         np.full(count, 0.5),
         ("",) * count,
         np.zeros(count),
+        (),
+        np.zeros(0, dtype=np.int64),
     )
     return made._replace(**changed)
 

@@ -12,11 +12,15 @@ from hmcs_laboratory.figures.catalog import FIGURES, find_figures
 from hmcs_laboratory.figures.run import FINDINGS, PAGE, make, make_figures, write
 
 NUMBERS = [
-    *("2.5", "2.6", "2.7", "2.8", "3.2", "3.3", "3.4", "3.6", "3.7"),
+    *("2.5", "2.6", "2.7", "2.8", "2.9", "2.10", *(f"2.{number}" for number in range(12, 18))),
+    *("3.2", "3.3", "3.4", "3.6", "3.7", "3.8", "3.9", "3.10"),
     *(f"4.{number}" for number in (*range(2, 14), 16, 17)),
-    *("B.1", "B.2"),
+    *("B.1", "B.2", "B.3"),
 ]
-RECORDED = {"3.4", "3.6", "3.7", "4.13", "4.16", "4.17", "B.2"}
+RECORDED = {
+    *("2.12", "2.13", "3.4", "3.6", "3.7", "3.8", "3.9", "3.10"),
+    *("4.13", "4.16", "4.17", "B.2", "B.3"),
+}
 TINY = {
     "repeats": 1,
     "performances": 1,
@@ -25,6 +29,10 @@ TINY = {
     "test": 1,
     "tasks": 1,
     "kinds": ("line",),
+    "compliances": 2,
+    "demonstrations": 3,
+    "law": ("insistence",),
+    "task": ("lines",),
 }
 CURVES = {
     "noise_curves": {"noise": (0.1, 0.4), "gestemes": 3, "training": 2},

