@@ -231,7 +231,9 @@ class ClosedLoopOperator:
         points = points - points[0]
         lengths = np.maximum(np.sqrt((points**2).sum(axis=1)), 1e-12)
         along = points @ (points / lengths[:, None]).T
-        beside = np.sqrt(np.maximum((points**2).sum(axis=1)[:, None] - along**2, 0.0))
+        onto = np.clip(along, 0.0, lengths)
+        squared = (points**2).sum(axis=1)[:, None] - 2.0 * onto * along + onto**2
+        beside = np.sqrt(np.maximum(squared, 0.0))
         # Row i, column j: how far point i lies off the straight way to point j beyond it.
         cut = np.triu(beside).max(axis=0)
         fits = np.flatnonzero(cut <= self._habits.cuts_m)

@@ -159,7 +159,7 @@ FIGURES: tuple[Figure[Any], ...] = (
         "Curve following, off-path targeting and obstacle avoidance: in the latter two the "
         "operator works against the fixture.",
         tasks_of_compliance,
-        ComplianceSettings(),
+        FieldSettings(),
         stand_in=_PEOPLE,
     ),
     Figure(

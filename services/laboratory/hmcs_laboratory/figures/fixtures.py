@@ -208,8 +208,9 @@ def joined_volumes(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
     )
 
 
-def tasks_of_compliance(settings: ComplianceSettings, rng: np.random.Generator) -> Drawn:
+def tasks_of_compliance(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
     """Draw figure 2.12: following a curve, targeting off it, and going around an obstacle."""
+    del settings
     picture = new_picture(3.6)
     titles = ("path following", "off-path targeting", "obstacle avoidance")
     numbers: dict[str, Any] = {}
@@ -289,8 +290,8 @@ def optimal_compliance_found(settings: ComplianceSettings, rng: np.random.Genera
         },
         f"With error and time alike (w = ½) the optimal compliance is {both:.2f}.",
         "The thesis quotes lines of Marayong et al. for people at a steady-hand robot; these are "
-        "of a simulated operator at a velocity-controlled one. Where the lines do not cross between 0 "
-        "and 1 the nearer end is taken.",
+        "of a simulated operator at a velocity-controlled one. Where the lines do not cross "
+        "between 0 and 1 the nearer end is taken.",
     )
 
 
