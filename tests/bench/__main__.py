@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from bench import accuracy, hmm_speed, messages, step_to_belief, stops, two_hops, whole_stack
+from bench import (
+    accuracy,
+    fixture_tick,
+    hmm_speed,
+    messages,
+    step_to_belief,
+    stops,
+    two_hops,
+    whole_stack,
+)
 from bench.figures import tell
 
 
@@ -15,6 +24,7 @@ def main() -> int:
         tell(str(whole_stack.__doc__), whole_stack.measure(20.0)),
         tell(str(accuracy.__doc__), accuracy.measure()),
         tell(str(hmm_speed.__doc__), hmm_speed.measure(20)),
+        tell(str(fixture_tick.__doc__), fixture_tick.measure(2000)),
         tell(str(stops.__doc__), stops.measure(25)),
     ]
     return 0 if all(reached) else 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench import accuracy, hmm_speed, messages, step_to_belief, two_hops, whole_stack
+from bench import accuracy, fixture_tick, hmm_speed, messages, step_to_belief, two_hops, whole_stack
 from bench.figures import Figure, tell
 
 
@@ -61,3 +61,9 @@ def test_hidden_markov_models_are_learned_and_filtered_faster_than_by_hmmlearn()
     large = [value for name, value in values.items() if str(hmm_speed.LARGE_MODELS) in name]
     assert len(large) == 2
     assert max(large) < 3 * hmm_speed.LARGE_UPDATE_US
+
+
+def test_a_tick_of_the_fixture_is_short_also_at_a_mesh() -> None:
+    values = measured(fixture_tick.measure(300))
+    assert values["tick without regions"] < 4 * fixture_tick.TICK_US
+    assert values["tick sliding along that mesh"] < 4 * fixture_tick.MESH_TICK_US
