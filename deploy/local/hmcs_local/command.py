@@ -253,8 +253,11 @@ def study(
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Of a Dask scheduler to run on.")
     ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the result; .png or .svg.")
+    ] = None,
 ) -> None:
-    """Measure what recognition is worth: methods side by side on the same data."""
+    """Measure what recognition and assistance are worth: methods side by side on the same data."""
     from hmcs_laboratory.command import list_studies, run_study
 
     if name is None:
@@ -268,6 +271,7 @@ def study(
             assignments=settings or (),
             as_json_line=json,
             cluster=cluster,
+            picture=picture,
         )
     )
 

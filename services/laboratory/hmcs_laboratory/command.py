@@ -46,14 +46,19 @@ def run_study(
     assignments: Sequence[str] = (),
     as_json_line: bool = False,
     cluster: str | None = None,
+    picture: Path | None = None,
 ) -> int:
     """Run a study and print its table, or one line of JSON; return the exit code.
 
-    `assignments` are the settings to change, `NAME=VALUE` each. Progress goes to standard error.
+    `assignments` are the settings to change, `NAME=VALUE` each; `picture` is a file to draw the
+    result to, of the studies that have a picture. Progress goes to standard error.
     Ctrl-C ends with 130. Raises UserError as `measure` and `Study.settings_from` do.
     """
     study = find_study(name)
     settings = study.settings_from(assignments)
+    if picture is not None and not study.picture:
+        drawn = ", ".join(each.name for each in STUDIES if each.picture)
+        raise UserError(f"--picture: study {name!r} has none; those that have: {drawn}")
     console = Console(stderr=True)
     try:
         with progress_shown(console, name, trials or study.trials) as told:
@@ -69,10 +74,15 @@ def run_study(
     except KeyboardInterrupt:
         console.print(f"{name}: interrupted")
         return INTERRUPTED
+    if picture is not None:
+        from hmcs_laboratory.figures.run import draw_study
+
+        draw_study(study, result.rows, picture)
+        console.print(f"{picture}: drawn", highlight=False)
     if as_json_line:
         print(as_json(result))
     else:
-        _stdout().print(as_table(result))
+        _stdout().print(as_table(result, study.table))
     return 0
 
 
@@ -148,6 +158,9 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
         help="change a setting; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE", help="draw the result; .png or .svg"
+    )
     parser.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler to run on")
 
 
@@ -164,6 +177,7 @@ def _study(given: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
         assignments=given.assignments,
         as_json_line=given.json,
         cluster=given.cluster,
+        picture=given.picture,
     )
 
 

@@ -22,15 +22,19 @@ def as_json(result: StudyResult) -> str:
     return json.dumps(result._asdict(), allow_nan=False)
 
 
-def as_table(result: StudyResult) -> Table:
-    """Return the result as a table: mean ± half width of the 95 % interval."""
+def as_table(result: StudyResult, shown: Sequence[str] = ()) -> Table:
+    """Return the result as a table: mean ± half width of the 95 % interval.
+
+    `shown` are the columns to show; all where there are none.
+    """
     # Folded rather than cut short where the screen is too narrow.
     table = Table(title=f"{result.study}: {result.trials} trials, seed {result.seed}")
     columns = list(dict.fromkeys(name for row in result.rows for name in row))
+    columns = [name for name in shown if name in columns] or columns
     for column in columns:
         if not column.endswith(CI95):
             table.add_column(
-                column, justify="left" if column == "method" else "right", overflow="fold"
+                column, justify="left" if column == columns[0] else "right", overflow="fold"
             )
     for row in result.rows:
         table.add_row(*(_cell(row, name) for name in columns if not name.endswith(CI95)))

@@ -69,6 +69,11 @@ class Study(Generic[Settings]):
     """How many are made unless told otherwise."""
     tiny: Mapping[str, str] = field(default_factory=dict)
     """Settings with which a trial takes a second or so."""
+    table: tuple[str, ...] = ()
+    """The columns of its table, where there are more than fit; all where empty."""
+    picture: str = ""
+    """`module:function` that draws its rows; empty where a table says it all. Named, since drawing
+    takes a second to import."""
 
     def settings_from(self, assignments: Sequence[str]) -> Settings:
         """Return the settings with those assigned as `NAME=VALUE`, the others as by default.

@@ -13,6 +13,7 @@ from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS
 from hmcs_laboratory.assistance.loop import Robot, Run, demonstrated, perform
 from hmcs_laboratory.assistance.measures import fighting, leave_s, measures, off_path, tremor_left
 from hmcs_laboratory.assistance.scenarios import FAMILIES, TASKS, Scenario
+from hmcs_laboratory.command import main
 from hmcs_laboratory.studies.assistance import ASSISTANCE
 from hmcs_laboratory.study import TIMINGS
 
@@ -203,3 +204,26 @@ def test_an_operator_who_never_arrives_is_said_not_to():
     )
     assert not run.arrived
     assert len(run.robot) == 100
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_the_study_draws_its_result(tmp_path, capsys, suffix):
+    file = tmp_path / f"worth{suffix}"
+    tiny = [f"--set={name}={value}" for name, value in ASSISTANCE.tiny.items()]
+    assert main(["study", "assistance", "--trials", "1", *tiny, "--picture", str(file)]) == 0
+    assert file.stat().st_size > 5000
+    assert "insistence" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["assistance", "--picture", "a.gif"], "ends in .png or .svg"),
+        (["restart", "--picture", "a.png"], "those that have: assistance"),
+    ],
+)
+def test_a_picture_that_cannot_be_is_a_users_mistake(capsys, arguments, says):
+    tiny = [f"--set={name}={value}" for name, value in ASSISTANCE.tiny.items()]
+    tiny = tiny if arguments[0] == "assistance" else []
+    assert main(["study", *arguments, "--trials", "1", *tiny]) == 2
+    assert says in capsys.readouterr().err

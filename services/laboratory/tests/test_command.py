@@ -56,7 +56,10 @@ def test_list_names_every_study(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nose"], "unknown study 'nose', did you mean noise? (choose of: calibration, "),
+        (
+            ["nose"],
+            "unknown study 'nose', did you mean noise? (choose of: assistance, calibration, ",
+        ),
         (["noise", "--set", "nose=1"], "unknown setting 'nose', did you mean noise?"),
         (["noise", "--set", "noise"], "--set noise: write NAME=VALUE"),
         (["noise", "--set", "noise=loud"], "noise=loud: Input should be a valid number"),

@@ -131,7 +131,7 @@ def stiffness_of_fixtures(settings: FieldSettings, rng: np.random.Generator) -> 
         picture,
         {"compliances": left_over},
         "A hand that moves up and to the right everywhere: the hard fixture leaves only motion "
-        "along the curve and back to it, the soft one half of what goes across.",
+        f"along the curve and back to it, the soft one {left_over[0]:.0%} of what goes across.",
         "The thesis sketches it; here it is law (2.29) with pull (2.32).",
     )
 
@@ -243,8 +243,15 @@ def tasks_of_compliance(settings: FieldSettings, rng: np.random.Generator) -> Dr
     return Drawn(
         picture,
         numbers,
-        "A simulated operator at three compliances: the stiff fixture steadies who follows the "
-        "curve and holds back who leaves it.",
+        "A simulated operator at three compliances: from the softest to the stiffest fixture the "
+        "error "
+        + "; ".join(
+            f"in {title} is "
+            + ", ".join(f"{numbers[f'{title}_{c:g}_error_mm']:.1f}" for c in (1.0, 0.6, 0.2))
+            + " mm"
+            for title in titles
+        )
+        + ".",
         "The thesis sketches the three tasks; here a simulated operator performs them.",
     )
 

@@ -8,10 +8,12 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import joblib
+from matplotlib.figure import Figure as Picture
 from threadpoolctl import threadpool_limits
 
 from hmcs.errors import UserError
@@ -20,6 +22,8 @@ from hmcs_laboratory.figures.drawing import Files, Number, files_of, house_style
 from hmcs_laboratory.figures.figure import Figure
 from hmcs_laboratory.figures.page import page
 from hmcs_laboratory.running import _interrupts_kept_from_workers, versions
+from hmcs_laboratory.study import Study
+from hmcs_laboratory.summary import Row
 
 Progress = Callable[[str, int, int], None]
 """Called with the number of the figure just made, how many are, and how many are to be."""
@@ -92,6 +96,20 @@ def write(path: Path, content: bytes) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def draw_study(study: Study[Any], rows: Sequence[Row], path: Path) -> None:
+    """Draw the rows of a study that has a picture to a file, .png or .svg.
+
+    Raises UserError for another ending, and where the file cannot be written.
+    """
+    if path.suffix not in (".png", ".svg"):
+        raise UserError(f"{path}: expected a file that ends in .png or .svg")
+    module, _, function = study.picture.partition(":")
+    draw: Callable[[Sequence[Row]], Picture] = getattr(import_module(module), function)
+    with house_style():
+        files = files_of(draw(rows))
+    write(path, files.png if path.suffix == ".png" else files.svg)
 
 
 def make(figure: Figure[Any], *, fast: bool, seed: int) -> Made:

@@ -191,4 +191,17 @@ ASSISTANCE = Study(
     AssistanceSettings,
     assistance_trial,
     tiny={"law": "insistence", "task": "lines", "demonstrations": "2"},
+    table=(
+        "law",
+        "task",
+        "operator",
+        "error_ratio",
+        "max_error_ratio",
+        "time_ratio",
+        "fighting",
+        "leave_ratio",
+        "hits",
+        "tremor_left",
+    ),
+    picture="hmcs_laboratory.figures.assistance:picture_of",
 )
