@@ -10,11 +10,13 @@ from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.paths import Path
 from hmcs.recognition.learning import learn
 from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS
-from hmcs_laboratory.assistance.loop import Robot, Run, demonstrated, perform
+from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
 from hmcs_laboratory.assistance.measures import fighting, leave_s, measures, off_path, tremor_left
+from hmcs_laboratory.assistance.robots import LaggingTool
 from hmcs_laboratory.assistance.scenarios import FAMILIES, TASKS, Scenario
 from hmcs_laboratory.command import main
 from hmcs_laboratory.studies.assistance import ASSISTANCE
+from hmcs_laboratory.studies.experiments import EXPERIMENT_1, EXPERIMENT_2, EXPERIMENT_3
 from hmcs_laboratory.study import TIMINGS
 
 LINE = Path(np.array([[0.0, 0, 0], [1.0, 0, 0]]))
@@ -44,6 +46,7 @@ def run_of(robot: np.ndarray, **changed: np.ndarray) -> Run:
         np.zeros(count),
         (),
         np.zeros(0, dtype=np.int64),
+        frozenset(),
     )
     return made._replace(**changed)
 
@@ -195,12 +198,11 @@ def test_an_operator_who_never_arrives_is_said_not_to():
     model = learn(taught.task, shown)
     run = perform(
         ClosedLoopOperator(STEADY, taught.path, np.random.default_rng(9)),
-        taught.path.points[0],
+        LaggingTool(taught.path.points[0], 0.03),
         model,
         LAWS[-1].rules(taught.task),
         period_s=PERIOD_S,
         most_s=1.0,
-        robot=Robot(),
     )
     assert not run.arrived
     assert len(run.robot) == 100
@@ -227,3 +229,28 @@ def test_a_picture_that_cannot_be_is_a_users_mistake(capsys, arguments, says):
     tiny = tiny if arguments[0] == "assistance" else []
     assert main(["study", *arguments, "--trials", "1", *tiny]) == 2
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("study", [EXPERIMENT_1, EXPERIMENT_2, EXPERIMENT_3])
+def test_the_experiments_of_chapter_3_are_run_to_their_end(study):
+    settings = study.settings_from([f"{name}={value}" for name, value in study.tiny.items()])
+    rows = study.trial(settings, np.random.default_rng(1))
+    assert [row.method for row in rows] == ["none", "chapter-3"]
+    for row in rows:
+        assert row.measures["arrived"] == 1.0
+        assert row.measures["error_mm"] < 20.0
+
+
+def test_an_arm_among_its_obstacles_follows_an_operator_without_touching_them():
+    settings = EXPERIMENT_1.settings_from(["law=insistence", "demonstrations=2"])
+    assert settings.robot == "physics"
+    for row in EXPERIMENT_1.trial(settings, np.random.default_rng(2)):
+        assert row.measures["arrived"] == 1.0
+        assert row.measures["collisions"] == 0.0
+        assert row.measures["error_mm"] < 15.0
+
+
+def test_a_robot_that_nobody_simulates_is_told():
+    settings = EXPERIMENT_1.settings_from(["robot=psychics", "demonstrations=2"])
+    with pytest.raises(UserError, match="did you mean physics"):
+        EXPERIMENT_1.trial(settings, np.random.default_rng(2))

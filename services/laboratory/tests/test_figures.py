@@ -32,6 +32,7 @@ TINY = {
     "compliances": 2,
     "demonstrations": 3,
     "law": ("insistence",),
+    "robot": "lag",
     "task": ("lines",),
 }
 CURVES = {

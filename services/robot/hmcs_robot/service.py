@@ -14,12 +14,11 @@ import numpy as np
 from hmcs.bus.messages import Command, Origin, RobotState
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
-from hmcs.task import Task, load_task
-from hmcs_robot.control import Motion, Standing, Tuning, follow, stand
-from hmcs_robot.driver import ArmDriver, ArmState, Pose
-from hmcs_robot.limits import Limits
+from hmcs.task import load_task
+from hmcs_robot.control import Motion, Standing, follow, stand
+from hmcs_robot.driver import ArmDriver, ArmState
+from hmcs_robot.set_up import limits_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings
-from hmcs_robot.simulation import Scene, Simulation
 from hmcs_robot.supervision import Order, Policy, Stop, Supervision, accept, tick
 
 _NS_PER_S = 1_000_000_000
@@ -36,12 +35,9 @@ class Robot(Service):
         super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
         self._period_ns = round(_NS_PER_S / settings.physics_rate_hz)
-        self._driver: ArmDriver = _simulated(self._task, settings)
-        self._limits = _limits(self._task, self._driver, settings)
-        self._tuning = Tuning(
-            damping=settings.damping,
-            correction_per_s=settings.correction_per_s,
-        )
+        self._driver: ArmDriver = simulated(self._task, settings)
+        self._limits = limits_of(self._task, self._driver, settings)
+        self._tuning = tuning_of(settings)
         self._policy = Policy(
             hang_ns=round(settings.hang_s * _NS_PER_S),
             settle_ns=round(settings.settle_s * _NS_PER_S),
@@ -177,27 +173,4 @@ def _state(robot: str, arm: ArmState, motion: Motion, supervision: Supervision) 
         contacts=arm.contacts,
         stop=supervision.stop,
         limited=motion.limited,
-    )
-
-
-def _simulated(task: Task, settings: RobotSettings) -> Simulation:
-    start = Pose(np.array(task.robot.tool_start_m), np.array(task.robot.tool_orientation_xyzw))
-    return Simulation(
-        Scene(task.robot.model, start, task.workspace.obstacles),
-        1.0 / settings.physics_rate_hz,
-        gui=settings.gui,
-        reach_m=settings.search_m,
-    )
-
-
-def _limits(task: Task, driver: ArmDriver, settings: RobotSettings) -> Limits:
-    return Limits(
-        joints=driver.limits,
-        speed_m_s=task.robot.speed_limit_m_s,
-        angular_speed_rad_s=task.robot.angular_speed_limit_rad_s,
-        workspace_lower_m=np.array(task.workspace.lower_m),
-        workspace_upper_m=np.array(task.workspace.upper_m),
-        acceleration_m_s2=settings.acceleration_limit_m_s2,
-        angular_acceleration_rad_s2=settings.angular_acceleration_limit_rad_s2,
-        braking_per_s=settings.braking_per_s,
     )

@@ -1,12 +1,10 @@
 """The closed loop in process: an operator, a recognizer, the fixture controller and a robot.
 
-They are the very objects that the services run, driven by a clock of their own; the robot is a
-first-order lag of its tool's velocity.
+They are the very objects that the services run, driven by a clock of their own.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,17 +19,10 @@ from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.recognizers import recognizer_of
+from hmcs_laboratory.assistance.robots import SimulatedRobot
 from hmcs_laboratory.assistance.scenarios import Taught
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Robot:
-    """How the robot follows its reference velocity."""
-
-    lag_s: float = 0.03
-    """Time constant of a first-order lag."""
 
 
 class Run(NamedTuple):
@@ -64,26 +55,26 @@ class Run(NamedTuple):
     """Of the hand, as the recognizer saw them; M of them."""
     step_at: NDArray[np.int64]
     """The sample that completed each, shape (M,)."""
+    touched: frozenset[str]
+    """Names of the obstacles the robot touched."""
 
 
 def perform(
     operator: ClosedLoopOperator,
-    start: Array,
+    robot: SimulatedRobot,
     model: Model,
     rules: Rules,
     *,
     period_s: float,
     most_s: float,
-    robot: Robot,
 ) -> Run:
-    """Return how an operator performs a task from `start`, m, shape (3,), under these rules."""
+    """Return how an operator performs a task with a robot under these rules."""
     controller = Controller(Safeguards())
     controller.load(model.name, Guides(model.paths, rules))
     controller.activate(model.name)
     recognizer = recognizer_of(model)
     zone = DeadZone(model.task.dead_zone_m)
-    follow = 1.0 - float(np.exp(-period_s / robot.lag_s)) if robot.lag_s > 0 else 1.0
-    hand, tool, velocity = np.zeros(3), np.array(start, dtype=float), np.zeros(3)
+    hand = np.zeros(3)
     rows: list[tuple[Array, ...]] = []
     states: list[str] = []
     steps: list[Step] = []
@@ -91,7 +82,7 @@ def perform(
     state, confidence, arrived = "", 0.0, False
     controller.sampled(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
     for tick in range(1, int(most_s / period_s) + 1):
-        now_s = tick * period_s
+        now_s, tool = tick * period_s, robot.position
         controller.robot_moved(now_s, tool)
         motion = operator.step(tool)
         if motion.arrived:
@@ -123,8 +114,7 @@ def perform(
             )
         )
         states.append(state)
-        velocity = velocity + follow * (fixture.command_twist[:3] - velocity)
-        tool = tool + velocity * period_s
+        robot.move(fixture.command_twist, period_s)
     robot_at, hand_velocity, intended, command, passed, force, told = (
         np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)
     )
@@ -143,6 +133,7 @@ def perform(
         confidence=told[:, 2],
         steps=tuple(steps),
         step_at=np.array(step_at, dtype=np.int64),
+        touched=robot.touched,
     )
 
 

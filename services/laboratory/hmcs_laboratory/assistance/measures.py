@@ -40,6 +40,7 @@ def measures(run: Run, scenario: Scenario) -> dict[str, float]:
         "hand_path_m": run.period_s * float(np.linalg.norm(run.hand_velocity, axis=1).sum()),
         "force_n": float(np.sqrt((force**2).mean())),
         "tremor_left": tremor_left(run),
+        "collisions": float(len(run.touched)),
     }
     if scenario.obstacle is not None:
         gap = np.linalg.norm(run.robot - scenario.obstacle.center, axis=1)

@@ -18,7 +18,7 @@ from hmcs.motion.detours import Detour, around
 from hmcs.motion.lasa import drawings, read_drawing
 from hmcs.motion.operators import joined
 from hmcs.motion.paths import Path, resample
-from hmcs.task import Task, find_task, load_task
+from hmcs.task import Obstacle, Task, Workspace, find_task, load_task
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ LENGTHS = (0.7, 1.3)
 """In a changed workspace every line is so many times as long as it was taught, drawn by lot."""
 WRONG_BY_M = 0.02
 """So far beside the taught curves is what an operator means whose model is wrong."""
+WALL_CHANGES_M = (0.03, 0.06)
+"""So much higher or lower is the wall of experiment 2."""
 OBSTACLE_M = 0.02
 """Radius of the unexpected obstacle."""
 CLEARANCE_M = 0.015
@@ -71,6 +73,8 @@ class Scenario(NamedTuple):
     """How the operator goes around it."""
     usual: Path | None = None
     """The path without the detour."""
+    workspace: Workspace | None = None
+    """Where it is performed; the task's own where None."""
 
 
 Family = Callable[[np.random.Generator, float], Taught]
@@ -113,6 +117,28 @@ def changed_lengths(taught: Taught, rng: np.random.Generator) -> Scenario:
     ]
     meant, _ = joined(curves, _SAMPLE_M)
     return Scenario(Path(meant + taught.path.points[0]))
+
+
+def changed_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return the path over a wall that is higher or lower than taught (experiment 2, fig. 3.9 c).
+
+    What leads up to it and down from it is as much longer or shorter.
+    """
+    lengths = np.diff(np.concatenate([[0.0], taught.ends_m]))
+    change_m = float(rng.uniform(*WALL_CHANGES_M) * rng.choice([-1.0, 1.0]))
+    factors = np.array([1.0 + change_m / lengths[0], 1.0, 1.0, 1.0 + change_m / lengths[3]])
+    curves = [
+        factor * (points - points[0])
+        for factor, points in zip(factors, _segments(taught), strict=True)
+    ]
+    meant, _ = joined(curves, _SAMPLE_M)
+    space = taught.task.workspace
+    obstacles = tuple(
+        _higher(obstacle, change_m) if obstacle.name == "wall" else obstacle
+        for obstacle in space.obstacles
+    )
+    workspace = space.model_copy(update={"obstacles": obstacles})
+    return Scenario(Path(meant + taught.path.points[0]), workspace=workspace)
 
 
 def unexpected_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
@@ -174,6 +200,15 @@ def _taught(task: Task, curves: Sequence[Sequence[Array] | Array]) -> Taught:
     last = np.searchsorted(owners, np.arange(len(curves)), side="right")
     ends_m = path.arc_length[np.minimum(last, len(whole) - 1)]
     return Taught(task, path, tuple(state.name for state in task.states), ends_m)
+
+
+def _higher(obstacle: Obstacle, by_m: float) -> Obstacle:
+    """A box that stands where it stood and is so much higher."""
+    assert obstacle.size_m is not None
+    (x, y, z), (width, depth, height) = obstacle.position_m, obstacle.size_m
+    return obstacle.model_copy(
+        update={"position_m": (x, y, z + by_m / 2), "size_m": (width, depth, height + by_m)}
+    )
 
 
 def _segments(taught: Taught) -> list[Array]:

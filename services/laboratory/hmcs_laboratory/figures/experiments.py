@@ -16,15 +16,16 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import kind_named, settings_of
 from hmcs.recognition.recognizers.direction_states import DirectionFilter, unit_rows
 from hmcs.recognition.recognizers.estimators import likelihoods
-from hmcs_laboratory.assistance.laws import LAWS
-from hmcs_laboratory.assistance.loop import Robot, Run, demonstrated, perform
+from hmcs_laboratory.assistance.laws import LAWS, AssistLaw
+from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
 from hmcs_laboratory.assistance.measures import off_path
+from hmcs_laboratory.assistance.robots import robot_of
 from hmcs_laboratory.assistance.scenarios import (
     Scenario,
     Sphere,
     Taught,
     as_taught,
-    changed_lengths,
+    changed_obstacle,
     taught_lines,
     unexpected_obstacle,
 )
@@ -57,6 +58,8 @@ class ExperimentSettings(StudySettings):
     """Performances without a fixture that are learned from."""
     dead_zone_m: Positive = 0.02
     """Of chapter 3's recognizer."""
+    robot: str = "physics"
+    """`physics` is a PUMA 560 among the obstacles, `lag` a tool that follows with a delay."""
 
 
 class _Experiments(NamedTuple):
@@ -138,14 +141,15 @@ def paths_of_experiments(settings: ExperimentSettings, rng: np.random.Generator)
         {
             "rms_error_mm": errors,
             "arrived": [run.arrived for run in done.runs],
+            "touched": [", ".join(sorted(run.touched)) for run in done.runs],
             "clearance_mm": 1e3 * float(gap),
         },
         "RMS error to the path meant: "
         + ", ".join(f"{error:.1f} mm" for error in errors)
         + f"; the obstacle is passed at {1e3 * gap:.1f} mm.",
         "The thesis had a PUMA 560 led by a tracker on a glove. Here a simulated operator who sees "
-        "the robot with a delay leads one that follows with a lag of 30 ms; recognizer, dead zone "
-        "and law are those of chapter 3.",
+        "the robot with a delay leads a simulated PUMA 560; recognizer, dead zone and law are "
+        "those of chapter 3. In (c) the wall is higher or lower than taught.",
     )
 
 
@@ -217,22 +221,37 @@ def _experiments(settings: ExperimentSettings, rng: np.random.Generator) -> _Exp
     model = learn(taught.task, shown, settings_of(kind, {}), recognizer=law.recognizer)
     scenarios = (
         as_taught(taught, stream(2)),
-        changed_lengths(taught, stream(3)),
+        changed_obstacle(taught, stream(3)),
         unexpected_obstacle(taught, stream(4)),
     )
     first, second, third = (
-        perform(
-            ClosedLoopOperator(STEADY, scenario.meant, stream(5, k), period_s=_PERIOD_S),
-            scenario.meant.points[0],
+        _performed(settings, taught, scenario, model, law, stream(5, k))
+        for k, scenario in enumerate(scenarios)
+    )
+    return _Experiments(taught, shown, model, scenarios, (first, second, third))
+
+
+def _performed(
+    settings: ExperimentSettings,
+    taught: Taught,
+    scenario: Scenario,
+    model: Model,
+    law: AssistLaw,
+    rng: np.random.Generator,
+) -> Run:
+    space = scenario.workspace or taught.task.workspace
+    robot = robot_of(taught.task.model_copy(update={"workspace": space}), settings.robot, 0.03)
+    try:
+        return perform(
+            ClosedLoopOperator(STEADY, scenario.meant, rng, period_s=_PERIOD_S),
+            robot,
             model,
             law.rules(taught.task),
             period_s=_PERIOD_S,
             most_s=_MOST_S,
-            robot=Robot(),
         )
-        for k, scenario in enumerate(scenarios)
-    )
-    return _Experiments(taught, shown, model, scenarios, (first, second, third))
+    finally:
+        robot.close()
 
 
 def _draw_states(ax: Axes, positions: Array, states: list[str], names: tuple[str, ...]) -> None:

@@ -8,6 +8,7 @@ from hmcs_laboratory.studies.assistance import ASSISTANCE
 from hmcs_laboratory.studies.calibration import CALIBRATION
 from hmcs_laboratory.studies.directions import DIRECTIONS
 from hmcs_laboratory.studies.drawings import LASA
+from hmcs_laboratory.studies.experiments import EXPERIMENT_1, EXPERIMENT_2, EXPERIMENT_3
 from hmcs_laboratory.studies.gestemes import (
     GESTEME_COUNT,
     NOISE,
@@ -39,4 +40,7 @@ STUDIES: tuple[Study[Any], ...] = (
     UNKNOWN,
     CALIBRATION,
     ASSISTANCE,
+    EXPERIMENT_1,
+    EXPERIMENT_2,
+    EXPERIMENT_3,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -16,9 +16,16 @@ from hmcs.recognition.recognizers import kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs.task.model import unknown
 from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS, AssistLaw
-from hmcs_laboratory.assistance.loop import Robot, Run, demonstrated, perform
+from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
 from hmcs_laboratory.assistance.measures import measures
-from hmcs_laboratory.assistance.scenarios import FAMILIES, TASKS, Scenario, Taught
+from hmcs_laboratory.assistance.robots import LAG, robot_of
+from hmcs_laboratory.assistance.scenarios import (
+    FAMILIES,
+    TASKS,
+    AssistedTask,
+    Scenario,
+    Taught,
+)
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.study import Measured, Study, StudySettings, seed_from
 
@@ -47,13 +54,14 @@ def _names(what: str, choices: Sequence[str]) -> AfterValidator:
     return AfterValidator(known)
 
 
-class AssistanceSettings(StudySettings):
-    """Who is helped how, and in what."""
+LawNames = Annotated[tuple[str, ...], _names("law", [law.name for law in LAWS])]
 
-    law: Annotated[tuple[str, ...], _names("law", [law.name for law in LAWS])] = ()
+
+class LoopSettings(StudySettings):
+    """Who is helped how."""
+
+    law: LawNames = ()
     """Laws to measure; all where none is named. The operator alone is always measured."""
-    task: Annotated[tuple[str, ...], _names("task", list(TASKS))] = ()
-    """All where none is named."""
     operator: Annotated[tuple[str, ...], _names("operator", list(PRESETS))] = ("steady",)
     """Simulated operators, by name."""
     demonstrations: Count = 5
@@ -62,14 +70,23 @@ class AssistanceSettings(StudySettings):
     """Of the recognizer."""
     rate_hz: Positive = 100.0
     """Samples of the hand and ticks of the fixture a second."""
+    robot: str = LAG
+    """`lag` is a tool that follows with a delay, `physics` the task's arm among its obstacles."""
     robot_lag_s: NotNegative = 0.03
-    """Time constant of the simulated robot."""
+    """Time constant of `lag`."""
+
+
+class AssistanceSettings(LoopSettings):
+    """Who is helped how, and in what."""
+
+    task: Annotated[tuple[str, ...], _names("task", list(TASKS))] = ()
+    """All where none is named."""
 
 
 class _Lesson:
     """What one operator was taught, and the models learned from it."""
 
-    def __init__(self, settings: AssistanceSettings, family: str, operator: str, seed: int) -> None:
+    def __init__(self, settings: LoopSettings, family: str, operator: str, seed: int) -> None:
         self._settings = settings
         self._models: dict[tuple[str, float], tuple[Model, float] | None] = {}
         taught_rng, *streams = (
@@ -106,12 +123,19 @@ class _Lesson:
 
 
 def assistance_trial(settings: AssistanceSettings, rng: np.random.Generator) -> list[Measured]:
-    """Measure every law with every operator in every task.
+    """Measure every law with every operator in every task."""
+    tasks = {name: task for name, task in TASKS.items() if name in (settings.task or TASKS)}
+    return measured_in(tasks, settings, rng)
+
+
+def measured_in(
+    tasks: Mapping[str, AssistedTask], settings: LoopSettings, rng: np.random.Generator
+) -> list[Measured]:
+    """Measure every law with every operator in these tasks.
 
     Operator, workspace and noise are the same for all laws.
     """
     rows: list[Measured] = []
-    tasks = {name: task for name, task in TASKS.items() if name in (settings.task or TASKS)}
     wanted = [law for law in LAWS if law.name in (*settings.law, UNAIDED) or not settings.law]
     for operator in settings.operator:
         seed = seed_from(rng)
@@ -147,7 +171,7 @@ def assistance_trial(settings: AssistanceSettings, rng: np.random.Generator) -> 
 
 
 def _performed(
-    settings: AssistanceSettings,
+    settings: LoopSettings,
     taught: Taught,
     scenario: Scenario,
     law: AssistLaw,
@@ -163,16 +187,20 @@ def _performed(
         np.random.default_rng([seed, 2000]),
         period_s=period_s,
     )
+    task = taught.task.model_copy(update={"workspace": scenario.workspace or taught.task.workspace})
+    robot = robot_of(task, settings.robot, settings.robot_lag_s)
     began_s = time.thread_time()
-    run = perform(
-        hand,
-        scenario.meant.points[0],
-        model,
-        law.rules(taught.task),
-        period_s=period_s,
-        most_s=MOST_S_PER_M * scenario.meant.length_m,
-        robot=Robot(settings.robot_lag_s),
-    )
+    try:
+        run = perform(
+            hand,
+            robot,
+            model,
+            law.rules(taught.task),
+            period_s=period_s,
+            most_s=MOST_S_PER_M * scenario.meant.length_m,
+        )
+    finally:
+        robot.close()
     return run, time.thread_time() - began_s
 
 
