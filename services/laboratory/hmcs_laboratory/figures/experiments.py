@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
@@ -124,6 +125,8 @@ def paths_of_experiments(settings: ExperimentSettings, rng: np.random.Generator)
         ax.set_title(title)
         ax.view_init(elev=24, azim=-150)
         label_space(ax, 3)
+        # Across the wall there is little way.
+        ax.xaxis.set_major_locator(MaxNLocator(2))
     handles = [
         Line2D([], [], color=color_of(k), marker=mark_of(k), ms=5, linestyle="", label=name)
         for k, name in enumerate(names)
