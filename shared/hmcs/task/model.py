@@ -22,6 +22,8 @@ from hmcs.task.parts import (
 from hmcs.task.values import Distribution, Name, Part
 
 Location = tuple[str | int, ...]
+AXES6 = ("vx", "vy", "vz", "wx", "wy", "wz")
+"""Of a twist, in the order of `axis_scale`."""
 
 
 class Task(Part):
@@ -115,6 +117,7 @@ def contradictions(draft: Draft) -> list[Contradiction]:
     if draft.workspace is not None and draft.robot is not None:
         found += _outside(draft.workspace, draft.robot)
     found += _narrow_volumes(draft)
+    found += _blocked_axes(draft)
     if draft.complete:
         strangers = list(_unknown_names(draft))
         # A misspelled name hides a way; what can be reached is told once the names are right.
@@ -195,6 +198,24 @@ def _narrow_volumes(draft: Draft) -> Iterator[Contradiction]:
                 f"radius is {widest_m:g} m at most, below dead_zone_m ({draft.dead_zone_m:g}): "
                 "within it nothing is recognized; make it wider, or leave volume out",
             )
+
+
+def _blocked_axes(draft: Draft) -> Iterator[Contradiction]:
+    """Where the operator is to help on an axis that passes nothing of the hand."""
+    if draft.fixture is None:
+        return
+    blocked = [
+        axis for axis, share in zip(AXES6, draft.fixture.axis_scale, strict=True) if not share
+    ]
+    for index, state in draft.states:
+        shared = None if state.fixture is None else state.fixture.shared
+        for axis in shared.operator_axes if shared is not None else ():
+            if axis in blocked:
+                yield Contradiction(
+                    ("states", index, "fixture", "shared", "operator_axes"),
+                    f"{axis} is the operator's, but axis_scale of the fixture lets nothing of it "
+                    "pass: give it a scale, or take it out of operator_axes",
+                )
 
 
 def _outside(workspace: Workspace, robot: RobotSetup) -> Iterator[Contradiction]:

@@ -380,3 +380,11 @@ def test_a_state_may_go_by_a_plan_or_to_a_target(check: Check) -> None:
     ):
         text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{fixture}}}")
         assert check(text) == []
+
+
+def test_an_axis_both_shared_and_blocked_is_told(check: Check) -> None:
+    shared = "plan: {}, shared: {operator_axes: [vx, wz]}"
+    text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{shared}}}")
+    (problem,) = check(f"{text}fixture:\n  axis_scale: [1, 1, 1, 1, 1, 0]\n")
+    assert "wz is the operator's" in problem.message
+    assert problem.path == "states[0].fixture.shared.operator_axes"
