@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bench.figures import Figure
 from hmcs.fixtures.controller import Controller, Guides, OperatorSample
 from hmcs.fixtures.meshes import Mesh
-from hmcs.fixtures.regions import Candidates, Region
+from hmcs.fixtures.regions import Region
 from hmcs.fixtures.rules import Safeguards, rules_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.motion.paths import Path
@@ -43,14 +43,16 @@ def measure(ticks: int) -> list[Figure]:
     ball = trimesh.creation.icosphere(6, RADIUS_M)
     # Stretched, so that no two directions are alike.
     vertices = np.asarray(ball.vertices) * [1.0, 0.9, 0.8]
-    mesh = Mesh(vertices, np.asarray(ball.faces, dtype=np.int64))
+    triangles = np.asarray(ball.faces, dtype=np.int64)
+    mesh = Mesh(vertices, triangles)
     rng = np.random.default_rng(0)
     away = rng.normal(size=(ticks, 3))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     surface = away * RADIUS_M * [1.0, 0.9, 0.8]
     near = surface + 0.5 * TRIANGLE_M * away
     queries = [Work(partial(mesh.candidates, point, TRIANGLE_M)) for point in near]
-    wall = mesh_wall(mesh)
+    # A tool at the origin is 1 mm beside it.
+    wall = Mesh(vertices - [0.0, 0.9 * RADIUS_M + 0.001, 0.0], triangles)
     return [
         Figure("tick without regions", median_us(session((), ticks)), "µs", at_most=TICK_US),
         Figure(
@@ -66,26 +68,6 @@ def measure(ticks: int) -> list[Figure]:
             at_most=MESH_TICK_US,
         ),
     ]
-
-
-def mesh_wall(mesh: Mesh) -> Region:
-    """The mesh, moved so that a tool at the origin is 1 mm beside it."""
-    return Moved(mesh, np.array([0.0, -0.9 * RADIUS_M - 0.001, 0.0]))
-
-
-class Moved:
-    """A region elsewhere."""
-
-    def __init__(self, region: Region, by: Array) -> None:
-        self._region, self._by = region, by
-
-    def candidates(self, point: Array, reach_m: float) -> Candidates:
-        """See `Region`."""
-        return self._region.candidates(point - self._by, reach_m)
-
-    def contains(self, point: Array) -> bool:
-        """See `Region`."""
-        return self._region.contains(point - self._by)
 
 
 def session(regions: tuple[Region, ...], ticks: int) -> list[Work]:

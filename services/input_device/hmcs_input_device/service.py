@@ -30,7 +30,7 @@ from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.simulated import Simulated
-from hmcs_input_device.sources import LIVE, DeviceSample, Source, open_source
+from hmcs_input_device.sources import LIVE, DeviceSample, SeesRobot, Source, open_source
 
 _NS_PER_S = 1_000_000_000
 
@@ -68,7 +68,7 @@ class InputDevice(Service):
         self.bus.watch(self.bus.keys.presence(ANY, ANY), self._on_presence)
         self.bus.answer("last_steps", LastStepsQuestion, self._last_steps)
         self.bus.answer("play", Ask, self._play)
-        if self._reaction is not None or isinstance(self._source, Simulated):
+        if self._reaction is not None or isinstance(self._source, SeesRobot):
             self.bus.subscribe(RobotState, self.bus.keys.robot_state, self._on_robot_state)
         if self._reaction is not None:
             self.bus.subscribe(FixtureState, self.bus.keys.fixture_state, self._on_fixture_state)
@@ -161,7 +161,7 @@ class InputDevice(Service):
         return round((now_ns - self._began_ns) / _NS_PER_S * self._rate_hz) / self._rate_hz
 
     def _on_robot_state(self, received: Received[RobotState]) -> None:
-        if isinstance(self._source, Simulated):
+        if isinstance(self._source, SeesRobot):
             self._source.sees(received.body.tool_position)
         heard_s = self._elapsed_s(received.received_ns)
         if self._reaction is not None and heard_s is not None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,14 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Let go of the device."""
+
+
+@runtime_checkable
+class SeesRobot(Protocol):
+    """A source whose operator looks at the robot."""
+
+    def sees(self, position: FloatArray) -> None:
+        """Take in where the robot's tool is, m, base frame, shape (3,)."""
 
 
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]

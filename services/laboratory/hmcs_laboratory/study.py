@@ -103,6 +103,16 @@ class Study(Generic[Settings]):
             raise UserError(f"study {self.name!r}: {what}") from error
 
 
+def known_once(what: str, names: tuple[str, ...], known: Sequence[str]) -> tuple[str, ...]:
+    """Return names that are all known and stand once; raises ValueError otherwise."""
+    for name in names:
+        if name not in known:
+            raise ValueError(unknown(what, name, known))
+    if len(set(names)) < len(names):
+        raise ValueError(f"{', '.join(names)}: expected every {what} once")
+    return names
+
+
 def stream_of(method: str, seed: int) -> np.random.Generator:
     """Return the random stream of a method: the same whatever other methods are measured."""
     return np.random.default_rng([seed, zlib.crc32(method.encode())])

@@ -58,3 +58,17 @@ def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def turn_rad(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the rotation vector, rad, from one orientation to another, in the base frame.
+
+    Both are unit quaternions x y z w, shape (4,).
+    """
+    u, v = after[:3], before[:3]
+    real = float(after @ before)
+    axis = before[3] * u - after[3] * v - np.cross(u, v)
+    if real < 0:
+        real, axis = -real, -axis
+    size = float(np.linalg.norm(axis))
+    return np.asarray(2.0 * math.atan2(size, real) * axis / size if size > 0 else axis)

@@ -8,13 +8,13 @@ Shapes: T steps, F dimensions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.motion.quaternions import turn_rad
 from hmcs.motion.steps import Step
 
 Array = NDArray[np.float64]
@@ -87,17 +87,3 @@ def dimensions(names: Sequence[str], axes: Sequence[int]) -> tuple[int, ...]:
     """Return how many dimensions each sensor has."""
     own = {"direction": len(axes), "length": 1}
     return tuple(own.get(name, 3) for name in names)
-
-
-def turn_rad(before: Array, after: Array) -> Array:
-    """Return the rotation vector, rad, from one orientation to another, in the base frame.
-
-    Both are unit quaternions x y z w, shape (4,).
-    """
-    u, v = after[:3], before[:3]
-    real = float(after @ before)
-    axis = before[3] * u - after[3] * v - np.cross(u, v)
-    if real < 0:
-        real, axis = -real, -axis
-    size = float(np.linalg.norm(axis))
-    return np.asarray(2.0 * math.atan2(size, real) * axis / size if size > 0 else axis)

@@ -9,7 +9,11 @@ from pydantic import Field, model_validator
 
 from hmcs.task.values import NotNegative, Number, Part, Point, Positive, Rotation, Share
 
+LawName = Literal["general", "thesis"]
 ComplianceName = Literal["belief", "insistence", "fixed", "optimal", "cue"]
+CueName = Literal["pedal", "silence", "recognized"]
+ScalingName = Literal["toggle", "fade", "hold"]
+TremorName = Literal["none", "notch", "fourier"]
 
 
 class FittedLine(Part):
@@ -35,8 +39,8 @@ class OptimalCompliance(Part):
 class Cue(Part):
     """How the operator tells that the path is to be left, and how the fixture gives way."""
 
-    cue: Literal["pedal", "silence", "recognized"] = "recognized"
-    scaling: Literal["toggle", "fade", "hold"] = "fade"
+    cue: CueName = "recognized"
+    scaling: ScalingName = "fade"
     fade_m: Positive = 0.02
     """So far beyond where the cue was given, `fade` leaves nothing of the force."""
     silence_s: Positive = 0.5
@@ -125,7 +129,7 @@ class SharedSetup(Part):
 class StateFixture(Part):
     """What one state's fixture does otherwise than the task's."""
 
-    law: Literal["general", "thesis"] | None = None
+    law: LawName | None = None
     compliance: ComplianceName | None = None
     maximum_factor: Share | None = None
     fixed_compliance: Share | None = None
@@ -149,7 +153,7 @@ class StateFixture(Part):
 class FixtureSetup(Part):
     """How the virtual fixture answers the belief."""
 
-    law: Literal["general", "thesis"] = "general"
+    law: LawName = "general"
     """`general` is (2.29), `thesis` is (3.6)."""
     compliance: ComplianceName = "insistence"
     """What softens the fixture: `belief` is (3.2), the less sure the softer; `insistence` lets go
@@ -189,7 +193,7 @@ class FixtureSetup(Part):
     shift_beyond_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.006
     """A path goes on from where the one before it ended, if the robot is no farther beside it than
     this when its segment begins; otherwise it is laid at the robot. 0 lays it there always."""
-    tremor: Literal["none", "notch", "fourier"] = "notch"
+    tremor: TremorName = "notch"
     """How tremor is taken out of the operator's velocity: a notch lets nothing pass at its center,
     the adaptive Fourier combiner finds the tremor's frequency by itself."""
     tremor_hz: Annotated[float, Field(ge=6, le=14)] = 10.0

@@ -19,11 +19,9 @@ from hmcs.task.parts import (
     State,
     Workspace,
 )
-from hmcs.task.values import Distribution, Name, Part
+from hmcs.task.values import TWIST_AXES, Distribution, Name, Part
 
 Location = tuple[str | int, ...]
-AXES6 = ("vx", "vy", "vz", "wx", "wy", "wz")
-"""Of a twist, in the order of `axis_scale`."""
 
 
 class Task(Part):
@@ -205,7 +203,7 @@ def _blocked_axes(draft: Draft) -> Iterator[Contradiction]:
     if draft.fixture is None:
         return
     blocked = [
-        axis for axis, share in zip(AXES6, draft.fixture.axis_scale, strict=True) if not share
+        axis for axis, share in zip(TWIST_AXES, draft.fixture.axis_scale, strict=True) if not share
     ]
     for index, state in draft.states:
         shared = None if state.fixture is None else state.fixture.shared

@@ -73,6 +73,8 @@ Point = tuple[Number, Number, Number]
 Rotation = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit)]
 Axis = Literal["x", "y", "z"]
 SignedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+TWIST_AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
+"""Of a twist, linear part first."""
 AXES: Mapping[str, int] = {"x": 0, "y": 1, "z": 2}
 """Where each axis stands in a position."""
 

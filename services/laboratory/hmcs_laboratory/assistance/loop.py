@@ -19,8 +19,8 @@ from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.recognizers import recognizer_of
-from hmcs_laboratory.assistance.robots import SimulatedRobot
-from hmcs_laboratory.assistance.scenarios import Taught
+from hmcs_laboratory.assistance.robots import SimulatedRobot, robot_of
+from hmcs_laboratory.assistance.scenarios import Scenario, Taught
 
 Array = NDArray[np.float64]
 
@@ -135,6 +135,30 @@ def perform(
         step_at=np.array(step_at, dtype=np.int64),
         touched=robot.touched,
     )
+
+
+def assisted(
+    operator: ClosedLoopOperator,
+    taught: Taught,
+    scenario: Scenario,
+    model: Model,
+    rules: Rules,
+    *,
+    robot: str,
+    robot_lag_s: float,
+    period_s: float,
+    most_s: float,
+) -> Run:
+    """Return how an operator performs what is meant in a scenario, with a robot of its own.
+
+    `robot` and `robot_lag_s` are as for `robot_of`, which says what is raised.
+    """
+    space = scenario.workspace or taught.task.workspace
+    made = robot_of(taught.task.model_copy(update={"workspace": space}), robot, robot_lag_s)
+    try:
+        return perform(operator, made, model, rules, period_s=period_s, most_s=most_s)
+    finally:
+        made.close()
 
 
 def demonstrated(

@@ -49,6 +49,11 @@ class Taught(NamedTuple):
     ends_m: Array
     """Arc length at which each segment ends, m, shape (S,)."""
 
+    @property
+    def lengths_m(self) -> Array:
+        """Of the segments, m, shape (S,)."""
+        return np.diff(np.concatenate([[0.0], self.ends_m]))
+
     def state_at(self, progress_m: float) -> str:
         """Return the state that the path is in so far along it."""
         index = int(np.searchsorted(self.ends_m, progress_m, side="right"))
@@ -110,13 +115,7 @@ def as_taught(taught: Taught, rng: np.random.Generator) -> Scenario:
 
 def changed_lengths(taught: Taught, rng: np.random.Generator) -> Scenario:
     """Return the path with every segment longer or shorter than taught (experiment 2)."""
-    factors = rng.uniform(*LENGTHS, size=len(taught.states))
-    curves = [
-        factor * (points - points[0])
-        for factor, points in zip(factors, _segments(taught), strict=True)
-    ]
-    meant, _ = joined(curves, _SAMPLE_M)
-    return Scenario(Path(meant + taught.path.points[0]))
+    return Scenario(_stretched(taught, rng.uniform(*LENGTHS, size=len(taught.states))))
 
 
 def changed_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
@@ -124,26 +123,20 @@ def changed_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
 
     What leads up to it and down from it is as much longer or shorter.
     """
-    lengths = np.diff(np.concatenate([[0.0], taught.ends_m]))
     change_m = float(rng.uniform(*WALL_CHANGES_M) * rng.choice([-1.0, 1.0]))
-    factors = np.array([1.0 + change_m / lengths[0], 1.0, 1.0, 1.0 + change_m / lengths[3]])
-    curves = [
-        factor * (points - points[0])
-        for factor, points in zip(factors, _segments(taught), strict=True)
-    ]
-    meant, _ = joined(curves, _SAMPLE_M)
+    factors = 1.0 + np.array([change_m, 0.0, 0.0, change_m]) / taught.lengths_m
     space = taught.task.workspace
     obstacles = tuple(
         _higher(obstacle, change_m) if obstacle.name == "wall" else obstacle
         for obstacle in space.obstacles
     )
     workspace = space.model_copy(update={"obstacles": obstacles})
-    return Scenario(Path(meant + taught.path.points[0]), workspace=workspace)
+    return Scenario(_stretched(taught, factors), workspace=workspace)
 
 
 def unexpected_obstacle(taught: Taught, rng: np.random.Generator) -> Scenario:
     """Return the path around a sphere that nobody taught (experiment 3)."""
-    lengths = np.diff(np.concatenate([[0.0], taught.ends_m]))
+    lengths = taught.lengths_m
     needed_m = 2.0 * (OBSTACLE_M + CLEARANCE_M + RUN_UP_M)
     segment = int(rng.choice(np.flatnonzero(lengths > needed_m)))
     spare_m = lengths[segment] - needed_m
@@ -200,6 +193,16 @@ def _taught(task: Task, curves: Sequence[Sequence[Array] | Array]) -> Taught:
     last = np.searchsorted(owners, np.arange(len(curves)), side="right")
     ends_m = path.arc_length[np.minimum(last, len(whole) - 1)]
     return Taught(task, path, tuple(state.name for state in task.states), ends_m)
+
+
+def _stretched(taught: Taught, factors: Array) -> Path:
+    """The taught path with each segment so many times as long."""
+    curves = [
+        factor * (points - points[0])
+        for factor, points in zip(factors, _segments(taught), strict=True)
+    ]
+    meant, _ = joined(curves, _SAMPLE_M)
+    return Path(meant + taught.path.points[0])
 
 
 def _higher(obstacle: Obstacle, by_m: float) -> Obstacle:

@@ -17,10 +17,9 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import kind_named, settings_of
 from hmcs.recognition.recognizers.direction_states import DirectionFilter, unit_rows
 from hmcs.recognition.recognizers.estimators import likelihoods
-from hmcs_laboratory.assistance.laws import LAWS, AssistLaw
-from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
+from hmcs_laboratory.assistance.laws import LAWS
+from hmcs_laboratory.assistance.loop import Run, assisted, demonstrated
 from hmcs_laboratory.assistance.measures import off_path
-from hmcs_laboratory.assistance.robots import robot_of
 from hmcs_laboratory.assistance.scenarios import (
     Scenario,
     Sphere,
@@ -48,6 +47,7 @@ Array = NDArray[np.float64]
 
 _PERIOD_S = 0.01
 _MOST_S = 120.0
+_LAG_S = 0.03
 _EVERY = 12
 """So many samples to a mark."""
 
@@ -91,7 +91,7 @@ def workspace(settings: ExperimentSettings, rng: np.random.Generator) -> Drawn:
     ]
     names = ["expected path of the tool", "start", "obstacles"]
     picture.legend(handles, names, loc="outside lower center", ncols=3)
-    lengths = np.diff(np.concatenate([[0.0], taught.ends_m]))
+    lengths = taught.lengths_m
     return Drawn(
         picture,
         {"lines_m": [float(length) for length in lengths]},
@@ -228,33 +228,20 @@ def _experiments(settings: ExperimentSettings, rng: np.random.Generator) -> _Exp
         unexpected_obstacle(taught, stream(4)),
     )
     first, second, third = (
-        _performed(settings, taught, scenario, model, law, stream(5, k))
-        for k, scenario in enumerate(scenarios)
-    )
-    return _Experiments(taught, shown, model, scenarios, (first, second, third))
-
-
-def _performed(
-    settings: ExperimentSettings,
-    taught: Taught,
-    scenario: Scenario,
-    model: Model,
-    law: AssistLaw,
-    rng: np.random.Generator,
-) -> Run:
-    space = scenario.workspace or taught.task.workspace
-    robot = robot_of(taught.task.model_copy(update={"workspace": space}), settings.robot, 0.03)
-    try:
-        return perform(
-            ClosedLoopOperator(STEADY, scenario.meant, rng, period_s=_PERIOD_S),
-            robot,
+        assisted(
+            ClosedLoopOperator(STEADY, scenario.meant, stream(5, k), period_s=_PERIOD_S),
+            taught,
+            scenario,
             model,
             law.rules(taught.task),
+            robot=settings.robot,
+            robot_lag_s=_LAG_S,
             period_s=_PERIOD_S,
             most_s=_MOST_S,
         )
-    finally:
-        robot.close()
+        for k, scenario in enumerate(scenarios)
+    )
+    return _Experiments(taught, shown, model, scenarios, (first, second, third))
 
 
 def _draw_states(ax: Axes, positions: Array, states: list[str], names: tuple[str, ...]) -> None:

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
 from hmcs.fixtures.compliance import FREE_FACTOR, Line, crossing, optimal_compliance
-from hmcs.fixtures.cues import CueName, ScalingName, stiffness_kept
+from hmcs.fixtures.cues import stiffness_kept
 from hmcs.fixtures.keep_out import KeepOut
 from hmcs.fixtures.law import Gains, full_speed_gains
 from hmcs.fixtures.parts import PreferredSubspace
@@ -21,6 +21,7 @@ from hmcs.fixtures.regions import Box, Region, nearby, sphere
 from hmcs.fixtures.volumes import Knot, Volume
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.paths import Path
+from hmcs.task.fixture_parts import CueName, ScalingName
 from hmcs_laboratory.data.hands import Count, Positive
 from hmcs_laboratory.figures.drawing import (
     COLORS,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from pydantic import AfterValidator
 
-from hmcs.task.model import unknown
 from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols, prepare
 from hmcs_laboratory.methods.online import OnlineMethod
 from hmcs_laboratory.methods.online_peers import (
@@ -20,6 +19,7 @@ from hmcs_laboratory.methods.single import fit_single, fit_single_of_share
 from hmcs_laboratory.methods.symbol_hmms import SYMBOL_METHODS
 from hmcs_laboratory.methods.vectors import fit_lda, fit_svm, fit_trees
 from hmcs_laboratory.methods.whole import WholeMethod
+from hmcs_laboratory.study import known_once
 
 WHOLE = (
     WholeMethod("hmcs-gestemes", "hmcs.recognition.single_gestemes", fit_single),
@@ -96,25 +96,12 @@ ONLINE = (*RECOGNIZERS, *ONLINE_PEERS)
 """Methods that follow a task."""
 
 
-Method = TypeVar("Method", WholeMethod, OnlineMethod)
-
-
-def _known(names: tuple[str, ...], choices: tuple[Method, ...]) -> tuple[str, ...]:
-    known = [method.name for method in choices]
-    for name in names:
-        if name not in known:
-            raise ValueError(unknown("method", name, known))
-    if len(set(names)) < len(names):
-        raise ValueError(f"{', '.join(names)}: expected every method once")
-    return names
-
-
 def _known_whole(names: tuple[str, ...]) -> tuple[str, ...]:
-    return _known(names, WHOLE)
+    return known_once("method", names, [method.name for method in WHOLE])
 
 
 def _known_online(names: tuple[str, ...]) -> tuple[str, ...]:
-    return _known(names, ONLINE)
+    return known_once("method", names, [method.name for method in ONLINE])
 
 
 WholeNames = Annotated[tuple[str, ...], AfterValidator(_known_whole)]

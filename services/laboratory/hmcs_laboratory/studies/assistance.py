@@ -14,11 +14,10 @@ from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import kind_named, settings_of
 from hmcs.recognition.segments import LearningError
-from hmcs.task.model import unknown
 from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS, AssistLaw
-from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
+from hmcs_laboratory.assistance.loop import Run, assisted, demonstrated
 from hmcs_laboratory.assistance.measures import measures
-from hmcs_laboratory.assistance.robots import LAG, robot_of
+from hmcs_laboratory.assistance.robots import LAG
 from hmcs_laboratory.assistance.scenarios import (
     FAMILIES,
     TASKS,
@@ -27,7 +26,7 @@ from hmcs_laboratory.assistance.scenarios import (
     Taught,
 )
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
-from hmcs_laboratory.study import Measured, Study, StudySettings, seed_from
+from hmcs_laboratory.study import Measured, Study, StudySettings, known_once, seed_from
 
 UNAIDED = "none"
 MOST_S_PER_M = 120.0
@@ -43,15 +42,7 @@ RATIOS = {
 
 
 def _names(what: str, choices: Sequence[str]) -> AfterValidator:
-    def known(names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if name not in choices:
-                raise ValueError(unknown(what, name, choices))
-        if len(set(names)) < len(names):
-            raise ValueError(f"{', '.join(names)}: expected every {what} once")
-        return names
-
-    return AfterValidator(known)
+    return AfterValidator(lambda names: known_once(what, names, choices))
 
 
 LawNames = Annotated[tuple[str, ...], _names("law", [law.name for law in LAWS])]
@@ -187,20 +178,18 @@ def _performed(
         np.random.default_rng([seed, 2000]),
         period_s=period_s,
     )
-    task = taught.task.model_copy(update={"workspace": scenario.workspace or taught.task.workspace})
-    robot = robot_of(task, settings.robot, settings.robot_lag_s)
     began_s = time.thread_time()
-    try:
-        run = perform(
-            hand,
-            robot,
-            model,
-            law.rules(taught.task),
-            period_s=period_s,
-            most_s=MOST_S_PER_M * scenario.meant.length_m,
-        )
-    finally:
-        robot.close()
+    run = assisted(
+        hand,
+        taught,
+        scenario,
+        model,
+        law.rules(taught.task),
+        robot=settings.robot,
+        robot_lag_s=settings.robot_lag_s,
+        period_s=period_s,
+        most_s=MOST_S_PER_M * scenario.meant.length_m,
+    )
     return run, time.thread_time() - began_s
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hmcs_laboratory.assistance.scenarios import (
@@ -30,29 +32,27 @@ EXPERIMENTS = {
 }
 
 
-def experiment_1(settings: ExperimentSettings, rng: np.random.Generator) -> list[Measured]:
-    """Follow the taught path in a narrow workspace (3.3.1)."""
-    return _measured(1, settings, rng)
-
-
-def experiment_2(settings: ExperimentSettings, rng: np.random.Generator) -> list[Measured]:
-    """Follow it over a wall whose height changed after training (3.3.2)."""
-    return _measured(2, settings, rng)
-
-
-def experiment_3(settings: ExperimentSettings, rng: np.random.Generator) -> list[Measured]:
-    """Leave it for an obstacle that was not there in training (3.3.3)."""
-    return _measured(3, settings, rng)
-
-
-def _measured(
-    number: int, settings: ExperimentSettings, rng: np.random.Generator
+def experiment_trial(
+    name: str, settings: ExperimentSettings, rng: np.random.Generator
 ) -> list[Measured]:
-    name = f"experiment-{number}"
+    """Measure every law in the experiment of that name."""
     return measured_in({name: EXPERIMENTS[name]}, settings, rng)
 
 
-_TINY = {"law": "chapter-3", "demonstrations": "2", "robot": "lag"}
+def _study(number: int, what: str) -> Study[ExperimentSettings]:
+    name = f"experiment-{number}"
+    return Study(
+        name,
+        f"chapter 3, experiment {number}: {what}",
+        f"Aarno 2007, 3.3.{number}",
+        ExperimentSettings,
+        partial(experiment_trial, name),
+        trials=5,
+        tiny={"law": "chapter-3", "demonstrations": "2", "robot": "lag"},
+        table=_TABLE,
+    )
+
+
 _TABLE = (
     "law",
     "error_ratio",
@@ -65,33 +65,6 @@ _TABLE = (
     "clearance_mm",
 )
 
-EXPERIMENT_1 = Study(
-    "experiment-1",
-    "chapter 3, experiment 1: following the taught path on a PUMA 560",
-    "Aarno 2007, 3.3.1",
-    ExperimentSettings,
-    experiment_1,
-    trials=5,
-    tiny=_TINY,
-    table=_TABLE,
-)
-EXPERIMENT_2 = Study(
-    "experiment-2",
-    "chapter 3, experiment 2: an obstacle of another size than in training",
-    "Aarno 2007, 3.3.2",
-    ExperimentSettings,
-    experiment_2,
-    trials=5,
-    tiny=_TINY,
-    table=_TABLE,
-)
-EXPERIMENT_3 = Study(
-    "experiment-3",
-    "chapter 3, experiment 3: an obstacle that was not there in training",
-    "Aarno 2007, 3.3.3",
-    ExperimentSettings,
-    experiment_3,
-    trials=5,
-    tiny=_TINY,
-    table=_TABLE,
-)
+EXPERIMENT_1 = _study(1, "following the taught path on a PUMA 560")
+EXPERIMENT_2 = _study(2, "an obstacle of another size than in training")
+EXPERIMENT_3 = _study(3, "an obstacle that was not there in training")

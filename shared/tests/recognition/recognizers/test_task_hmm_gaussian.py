@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from hmcs.motion.quaternions import turn_rad
 from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.learning import learn
@@ -18,7 +19,7 @@ from hmcs.recognition.recognizers.task_hmm_gaussian import (
     slot_log_emission,
 )
 from hmcs.recognition.segments import LearningError, Segment, labeled_steps
-from hmcs.recognition.sensors import SensorReader, Sensors, sensor_rows, turn_rad
+from hmcs.recognition.sensors import SensorReader, Sensors, sensor_rows
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from support.lessons import ROUND, lesson_task, performed, steps_performed
