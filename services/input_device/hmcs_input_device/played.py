@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from hmcs.errors import UserError
 from hmcs.motion.closed_loop_operators import PRESETS, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration, read_csv
+from hmcs.motion.leading import leading_hand
 from hmcs.motion.operators import Operator, OperatorStuckError, TaskSegment, joined, perform
 from hmcs.motion.paths import Path
 from hmcs.motion.references import References, random_gesteme, random_performance
@@ -98,6 +98,7 @@ def simulated(settings: InputDeviceSettings, task: Task) -> Simulated:
         lead_in_s=settings.lead_in_s,
         reach_m=float(np.linalg.norm(meant - meant[0], axis=1).max()),
         reaction=Reaction(settings.reaction_s) if settings.re_engage else None,
+        leading=leading_hand(task),
     )
 
 
@@ -134,16 +135,13 @@ def _segments(
     settings: InputDeviceSettings, demonstration: Demonstration, task: Task
 ) -> list[TaskSegment]:
     names = {state.name for state in task.states}
-    states = demonstration.states
     segments = []
-    for state, indices in groupby(range(len(states)), states.__getitem__):
-        run = list(indices)
-        # A segment ends where the next one begins, on the sample that both share.
-        points = demonstration.positions[run[0] : run[-1] + 2]
+    for state, samples in demonstration.stretches:
+        points = demonstration.positions[samples]
         if state not in names:
             raise UserError(
-                f"{settings.demonstration}: sample {run[0] + 1} is of state {state!r}, expected "
-                f"every sample labeled with one of {', '.join(sorted(names))}"
+                f"{settings.demonstration}: sample {samples.start + 1} is of state {state!r}, "
+                f"expected every sample labeled with one of {', '.join(sorted(names))}"
             )
         if (points != points[0]).any():
             segments.append(TaskSegment(str(state), points))

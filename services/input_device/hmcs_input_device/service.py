@@ -162,7 +162,7 @@ class InputDevice(Service):
 
     def _on_robot_state(self, received: Received[RobotState]) -> None:
         if isinstance(self._source, SeesRobot):
-            self._source.sees(received.body.tool_position)
+            self._source.sees(received.body.tool_position, received.body.tool_orientation)
         heard_s = self._elapsed_s(received.received_ns)
         if self._reaction is not None and heard_s is not None:
             self._reaction.robot_told(heard_s, follows=received.body.stop == "none")

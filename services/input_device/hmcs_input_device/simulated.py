@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
+from hmcs.motion.leading import LeadingHand
 from hmcs_input_device.reaction import Reaction
 from hmcs_input_device.sources import LIVE, DeviceSample
 
@@ -16,7 +17,7 @@ MOST_BEHIND = 10
 
 
 class Simulated:
-    """One performance by a `ClosedLoopOperator`.
+    """One performance by a `ClosedLoopOperator`, with a hand of their own or on the robot's tool.
 
     The hand rests with the dead-man released before it and after it, and while nobody knows where
     the robot is.
@@ -30,10 +31,17 @@ class Simulated:
         lead_in_s: float,
         reach_m: float,
         reaction: Reaction | None = None,
+        leading: LeadingHand | None = None,
     ) -> None:
+        """Be asked `rate_hz` times a second, and rest for `lead_in_s` before the hand moves.
+
+        With `leading` the hand is where the tool is, and its velocity is the one its force asks
+        for.
+        """
         self._operator = operator
         self._lead_in_s = lead_in_s
-        self._robot: FloatArray | None = None
+        self._robot: tuple[FloatArray, FloatArray] | None = None
+        self._leading = leading
         self._hand = np.zeros(3)
         self._made = 0
         self._ended_s: float | None = None
@@ -46,9 +54,11 @@ class Simulated:
         """When it arrived; LIVE until then."""
         return LIVE if self._ended_s is None else self._ended_s
 
-    def sees(self, position: FloatArray) -> None:
-        """Take in where the robot's tool is, m, base frame, shape (3,)."""
-        self._robot = position
+    def sees(self, position: FloatArray, orientation: FloatArray) -> None:
+        """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
+        self._robot = position, orientation
+        if self._leading is not None:
+            self._hand = position
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
         """Return the hand `elapsed_s` after it was told to begin; one period of motion a call."""
@@ -63,16 +73,21 @@ class Simulated:
             return resting
         due = self._due(elapsed_s)
         self._made = max(self._made, due - MOST_BEHIND)
-        velocity = np.zeros(3)
+        velocity, wrench = np.zeros(3), None
+        tool, orientation = self._robot
         while self._made < due:
-            motion = self._operator.step(self._robot)
+            motion = self._operator.step(tool)
             self._made += 1
             if motion.arrived:
                 self._ended_s = elapsed_s
                 return resting
             velocity = motion.velocity
-            self._hand = self._hand + velocity / self.rate_hz
-        return DeviceSample(self._hand, velocity, dead_man=True)
+            if self._leading is None:
+                self._hand = self._hand + velocity / self.rate_hz
+            else:
+                led = self._leading.push(velocity, orientation, 1.0 / self.rate_hz)
+                velocity, wrench = led.twist[:3], led.wrench
+        return DeviceSample(self._hand, velocity, dead_man=True, wrench=wrench)
 
     def close(self) -> None:
         """Nothing is held."""

@@ -79,8 +79,8 @@ class Source(Protocol):
 class SeesRobot(Protocol):
     """A source whose operator looks at the robot."""
 
-    def sees(self, position: FloatArray) -> None:
-        """Take in where the robot's tool is, m, base frame, shape (3,)."""
+    def sees(self, position: FloatArray, orientation: FloatArray) -> None:
+        """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
 
 
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]

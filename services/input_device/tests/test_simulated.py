@@ -17,6 +17,7 @@ from hmcs_input_device.sources import LIVE, open_source
 
 LINES = load_task("lines-through-obstacles")
 LINES_CSV = find_task("lines-through-obstacles").with_suffix(".csv")
+TURNED = np.array(LINES.robot.tool_orientation_xyzw)
 END = read_csv(LINES_CSV).positions[-1]
 
 
@@ -33,7 +34,7 @@ def led(source: Simulated, seconds: float, begin_s: float = 0.0) -> np.ndarray:
     """Where the source leads a robot that follows its hand, m, shape (T, 3)."""
     robot, trail = np.array(LINES.robot.tool_start_m), []
     for tick in range(round(seconds * source.rate_hz)):
-        source.sees(robot)
+        source.sees(robot, TURNED)
         sample = source.sample(begin_s + tick / source.rate_hz)
         if sample.dead_man:
             robot = robot + sample.velocity / source.rate_hz
@@ -51,7 +52,7 @@ def test_it_leads_a_robot_that_follows_to_the_end_and_rests_there() -> None:
 
 def test_a_robot_that_does_not_follow_is_steered_all_the_same() -> None:
     source = opened()
-    source.sees(np.array(LINES.robot.tool_start_m))
+    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
     samples = [source.sample(tick / 100) for tick in range(200)]
     assert samples[-1].dead_man
     assert np.linalg.norm(samples[-1].velocity) > 0.02
@@ -60,7 +61,7 @@ def test_a_robot_that_does_not_follow_is_steered_all_the_same() -> None:
 
 def test_the_hand_goes_as_far_as_its_velocity_says() -> None:
     source = opened()
-    source.sees(np.array(LINES.robot.tool_start_m))
+    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
     samples = [source.sample(tick / 100) for tick in range(300)]
     moved = samples[-1].position - samples[0].position
     np.testing.assert_allclose(moved, sum(s.velocity for s in samples) / 100, atol=1e-9)
@@ -69,13 +70,13 @@ def test_the_hand_goes_as_far_as_its_velocity_says() -> None:
 def test_it_waits_until_the_robot_is_seen() -> None:
     source = opened()
     assert not any(source.sample(tick / 100).dead_man for tick in range(200))
-    source.sees(np.array(LINES.robot.tool_start_m))
+    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
     assert source.sample(2.0).dead_man
 
 
 def test_a_process_that_hung_does_not_jump() -> None:
     source = opened()
-    source.sees(np.array(LINES.robot.tool_start_m))
+    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
     before = [source.sample(tick / 100) for tick in range(100)][-1]
     after = source.sample(5.0)
     assert np.linalg.norm(after.position - before.position) < 0.03
@@ -100,3 +101,29 @@ def test_what_is_meant_has_to_fit_the_task(tmp_path: Any) -> None:
     file.write_text("time_s,x_m,y_m,z_m,state\n0,0,0,0,dance\n1,1,0,0,dance\n")
     with pytest.raises(UserError, match="dance"):
         opened(demonstration=file)
+
+
+def test_a_hand_on_the_tool_is_where_the_tool_is_and_tells_its_force() -> None:
+    task = load_task("object-3d")
+    source = open_source(
+        InputDeviceSettings(
+            task=task.name,
+            source="simulated",
+            lead_in_s=0.5,
+            demonstration=find_task(task.name).with_suffix(".csv"),
+        ),
+        task,
+        BUILT_IN,
+    )
+    assert isinstance(source, Simulated)
+    robot = np.array(task.robot.tool_start_m)
+    turned = np.array(task.robot.tool_orientation_xyzw)
+    for tick in range(3000):
+        source.sees(robot, turned)
+        sample = source.sample(tick / source.rate_hz)
+        np.testing.assert_array_equal(sample.position, robot)
+        if sample.dead_man:
+            assert sample.wrench is not None
+            robot = robot + sample.velocity / source.rate_hz
+    end = read_csv(find_task(task.name).with_suffix(".csv")).positions[-1]
+    assert np.linalg.norm(robot - end) < 0.01

@@ -13,10 +13,11 @@ from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS
 from hmcs_laboratory.assistance.loop import Run, demonstrated, perform
 from hmcs_laboratory.assistance.measures import fighting, leave_s, measures, off_path, tremor_left
 from hmcs_laboratory.assistance.robots import LaggingTool
-from hmcs_laboratory.assistance.scenarios import FAMILIES, TASKS, Scenario
+from hmcs_laboratory.assistance.scenarios import FAMILIES, TASKS, Scenario, unseen_order
 from hmcs_laboratory.command import main
 from hmcs_laboratory.studies.assistance import ASSISTANCE
 from hmcs_laboratory.studies.experiments import EXPERIMENT_1, EXPERIMENT_2, EXPERIMENT_3
+from hmcs_laboratory.studies.force_tasks import FORCE_TASK_2D, FORCE_TASK_3D
 from hmcs_laboratory.study import TIMINGS
 
 LINE = Path(np.array([[0.0, 0, 0], [1.0, 0, 0]]))
@@ -198,7 +199,7 @@ def test_an_operator_who_never_arrives_is_said_not_to():
     model = learn(taught.task, shown)
     run = perform(
         ClosedLoopOperator(STEADY, taught.path, np.random.default_rng(9)),
-        LaggingTool(taught.path.points[0], 0.03),
+        LaggingTool(taught.path.points[0], np.array([0.0, 0.0, 0.0, 1.0]), 0.03),
         model,
         LAWS[-1].rules(taught.task),
         period_s=PERIOD_S,
@@ -254,3 +255,27 @@ def test_a_robot_that_nobody_simulates_is_told():
     settings = EXPERIMENT_1.settings_from(["robot=psychics", "demonstrations=2"])
     with pytest.raises(UserError, match="did you mean physics"):
         EXPERIMENT_1.trial(settings, np.random.default_rng(2))
+
+
+@pytest.mark.parametrize("study", [FORCE_TASK_2D, FORCE_TASK_3D])
+def test_a_robot_led_by_its_tool_is_recognized_and_touches_nothing(study):
+    settings = study.settings_from(["demonstrations=2", "performances=1"])
+    assert settings.robot == "physics"
+    rows = study.trial(settings, np.random.default_rng(3))
+    orders = {row.setting["order"] for row in rows}
+    assert orders == ({"trained order", "unseen order"} if study is FORCE_TASK_2D else orders)
+    for row in rows:
+        assert row.measures["arrived"] == 1.0
+        assert row.measures["collisions"] == 0.0
+        assert row.measures["error_mm"] < 10.0
+        assert row.measures["accuracy"] > (0.8 if row.setting["recognizer"] == "lhmm" else 0.9)
+
+
+def test_the_unseen_order_is_made_of_the_strokes_that_were_taught():
+    taught = FAMILIES["surface"](np.random.default_rng(0), 0.01)
+    other = unseen_order(taught, np.random.default_rng(0))
+    assert other.meant.length_m == pytest.approx(taught.path.length_m, rel=1e-3)
+    assert other.ends_m is not None
+    assert other.ends_m[-1] == pytest.approx(taught.ends_m[-1])
+    gestemes = [taught.task.state(state).gestemes[0] for state in other.states]
+    assert gestemes == ["stroke", "rise", "bow", "stroke", "bow", "rise"]

@@ -38,6 +38,11 @@ class LockstepRobot:
         return self._arm.tool.position
 
     @property
+    def orientation(self) -> Array:
+        """How the tool is turned, x y z w, base frame, shape (4,)."""
+        return self._arm.tool.orientation
+
+    @property
     def touched(self) -> frozenset[str]:
         """Names of the obstacles that were touched so far."""
         return frozenset(self._touched)

@@ -61,6 +61,16 @@ class Demonstration(NamedTuple):
         before = (None, *self.states)
         return np.array([own != last for own, last in zip(self.states, before, strict=False)])
 
+    @property
+    def stretches(self) -> Iterator[tuple[str | None, slice]]:
+        """Each label with the samples it lasts for, in their order.
+
+        A stretch ends where the next begins, on the sample that both share.
+        """
+        edges = [0, *(np.flatnonzero(self.switches[1:]) + 1).tolist()]
+        for begin, end in zip(edges, [*edges[1:], len(self.positions)], strict=True):
+            yield self.states[begin], slice(begin, min(end + 1, len(self.positions)))
+
     def cut(self, begin: int, end: int | None) -> Demonstration:
         """Return the samples from `begin` up to `end`, which is not among them."""
         part = slice(begin, end)

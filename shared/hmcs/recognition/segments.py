@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -89,30 +88,25 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
     for demonstration in demonstrations:
         _check(demonstration)
         labeled, own, last = False, list[Segment](), -1
-        for label, run in groupby(
-            range(len(demonstration.positions)), key=demonstration.states.__getitem__
-        ):
+        for label, samples in demonstration.stretches:
             if label is None:
                 continue
             labeled = True
-            samples = list(run)
-            # A segment ends where the next begins: the sample that opens the next closes this one.
-            stop = min(samples[-1] + 2, len(demonstration.positions))
-            piece = demonstration.cut(samples[0], stop)
+            piece = demonstration.cut(samples.start, samples.stop)
             positions = piece.positions
             steps = tuple(steps_of_demonstration(piece, task.dead_zone_m))
             if len(steps) < 2:
                 raise LearningError(
                     f"demonstration {demonstration.name!r}: the stretch labeled {label!r} from "
-                    f"{demonstration.time_s[samples[0]]:.2f} s on moves "
+                    f"{demonstration.time_s[samples.start]:.2f} s on moves "
                     f"{_extent(positions):.4f} m and makes {len(steps)} steps, but 2 are "
                     f"needed: demonstrate it larger or lower dead_zone_m ({task.dead_zone_m})"
                 )
             state, gesteme = _meant(task, label, demonstration.name)
-            if own and samples[0] == last + 1:
+            if own and samples.start == last:
                 own[-1] = own[-1]._replace(after=steps[0].displacement)
             own.append(Segment(demonstration.name, state, gesteme, positions, steps))
-            last = samples[-1]
+            last = samples.stop - 1
         segments += own
         if not labeled:
             raise LearningError(

@@ -11,6 +11,7 @@ from hmcs.task.values import (
     Axis,
     Distribution,
     Name,
+    NotNegative,
     Part,
     Point,
     Positive,
@@ -168,10 +169,31 @@ class Workspace(Part):
         }
 
 
+class Cooperation(Part):
+    """How a robot gives way to the force at its tool (thesis 4.3)."""
+
+    force_threshold_n: NotNegative = 2.0
+    """A weaker force moves nothing."""
+    torque_threshold_n_m: NotNegative = 0.2
+    m_s_per_n: Positive = 0.01
+    """Speed for a force beyond the threshold."""
+    rad_s_per_n_m: Positive = 0.2
+    tool_mass_kg: NotNegative = 0.5
+    """Of what hangs on the force sensor; its weight is removed from what is read."""
+    tool_center_m: Point = (0.0, 0.0, 0.03)
+    """Of its mass, tool frame."""
+    sensor_bandwidth_hz: Positive = 30.0
+    """The sensor passes what is slower (−3 dB)."""
+
+
 class RobotSetup(Part):
     """The robot, and where it begins."""
 
     model: Literal["puma560", "iiwa", "panda"]
+    mode: Literal["teleoperated", "cooperative"] = "teleoperated"
+    """`teleoperated`: it follows a hand elsewhere. `cooperative`: the hand leads it by its tool."""
+    cooperation: Cooperation = Cooperation()
+    """Of `cooperative`."""
     tool_start_m: Point
     """Position of the tool at the start of the task, base frame."""
     tool_orientation_xyzw: Rotation

@@ -77,7 +77,7 @@ def test_a_right_file_has_no_problem(check: Check) -> None:
 
 
 def test_both_shipped_tasks_are_right_and_found_by_name() -> None:
-    assert shipped_tasks() == ("human-shapes", "lines-through-obstacles")
+    assert shipped_tasks() == ("human-shapes", "lines-through-obstacles", "object-3d", "surface-2d")
     for name in shipped_tasks():
         assert check_task(name) == []
         assert load_task(name).name == name

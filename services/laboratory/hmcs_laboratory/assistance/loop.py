@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from hmcs.fixtures.controller import Controller, Fixture, Guides, OperatorSample
 from hmcs.fixtures.rules import Rules, Safeguards
 from hmcs.fixtures.trust import SegmentBelief
+from hmcs.fixtures.workspace import regions_of
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.leading import leading_hand
 from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
@@ -68,9 +70,13 @@ def perform(
     period_s: float,
     most_s: float,
 ) -> Run:
-    """Return how an operator performs a task with a robot under these rules."""
+    """Return how an operator performs a task with a robot under these rules.
+
+    Where the task is cooperative the hand is on the robot's tool and pushes it.
+    """
+    leading = leading_hand(model.task)
     controller = Controller(Safeguards())
-    controller.load(model.name, Guides(model.paths, rules))
+    controller.load(model.name, Guides(model.paths, rules, regions_of(model.task)))
     controller.activate(model.name)
     recognizer = recognizer_of(model)
     zone = DeadZone(model.task.dead_zone_m)
@@ -88,8 +94,11 @@ def perform(
         if motion.arrived:
             arrived = True
             break
-        hand = hand + motion.velocity * period_s
-        twist = np.concatenate([motion.velocity, np.zeros(3)])
+        if leading is None:
+            hand = hand + motion.velocity * period_s
+            twist = np.concatenate([motion.velocity, np.zeros(3)])
+        else:
+            hand, twist = tool, leading.push(motion.velocity, robot.orientation, period_s).twist
         fixture = controller.sampled(
             now_s, OperatorSample(tick, hand, twist, dead_man=True, clutch=False)
         )
@@ -105,7 +114,7 @@ def perform(
         rows.append(
             (
                 tool,
-                motion.velocity,
+                twist[:3],
                 motion.intended,
                 fixture.command_twist[:3],
                 passed_by(fixture, motion.intended),

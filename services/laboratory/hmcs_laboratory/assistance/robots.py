@@ -32,6 +32,10 @@ class SimulatedRobot(Protocol):
         """Where the tool is, m, base frame, shape (3,)."""
 
     @property
+    def orientation(self) -> Array:
+        """How the tool is turned, x y z w, base frame, shape (4,)."""
+
+    @property
     def touched(self) -> frozenset[str]:
         """Names of the obstacles that were touched so far."""
 
@@ -45,9 +49,10 @@ class SimulatedRobot(Protocol):
 class LaggingTool:
     """A tool alone, whose velocity follows with a first-order lag; nothing is in its way."""
 
-    def __init__(self, start: Array, lag_s: float) -> None:
+    def __init__(self, start: Array, orientation: Array, lag_s: float) -> None:
         """Begin at `start`, m, shape (3,), with a time constant of `lag_s`."""
         self._position = np.array(start, dtype=float)
+        self.orientation = np.array(orientation, dtype=float)
         self._velocity = np.zeros(3)
         self._lag_s = lag_s
 
@@ -77,7 +82,8 @@ def robot_of(task: Task, name: str, lag_s: float) -> SimulatedRobot:
     Raises UserError for a name that is none, and as the simulation does.
     """
     if name == LAG:
-        return LaggingTool(np.array(task.robot.tool_start_m), lag_s)
+        start, turned = task.robot.tool_start_m, task.robot.tool_orientation_xyzw
+        return LaggingTool(np.array(start), np.array(turned), lag_s)
     others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     if name not in others:
         raise UserError(unknown("robot", name, [LAG, *others]))

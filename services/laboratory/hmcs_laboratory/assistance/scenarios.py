@@ -56,8 +56,13 @@ class Taught(NamedTuple):
 
     def state_at(self, progress_m: float) -> str:
         """Return the state that the path is in so far along it."""
-        index = int(np.searchsorted(self.ends_m, progress_m, side="right"))
-        return self.states[min(index, len(self.states) - 1)]
+        return state_at(self.states, self.ends_m, progress_m)
+
+
+def state_at(states: Sequence[str], ends_m: Array, progress_m: float) -> str:
+    """Return the state whose segment, ending at `ends_m`, has the place `progress_m` in it."""
+    index = int(np.searchsorted(ends_m, progress_m, side="right"))
+    return states[min(index, len(states) - 1)]
 
 
 class Sphere(NamedTuple):
@@ -80,6 +85,10 @@ class Scenario(NamedTuple):
     """The path without the detour."""
     workspace: Workspace | None = None
     """Where it is performed; the task's own where None."""
+    states: tuple[str, ...] = ()
+    """What is meant by each segment, where it is not what was taught in that place."""
+    ends_m: Array | None = None
+    """Arc length at which each of them ends, m."""
 
 
 Family = Callable[[np.random.Generator, float], Taught]
@@ -107,10 +116,36 @@ def taught_curves(rng: np.random.Generator, dead_zone_m: float) -> Taught:
     return _taught(task, curves)
 
 
+def taught_on_surface(rng: np.random.Generator, dead_zone_m: float) -> Taught:
+    """Return the six strokes on a plane surface (section 4.3, fig. 4.15 left)."""
+    del rng
+    return _taught_along_file("surface-2d", dead_zone_m)
+
+
+def taught_around_object(rng: np.random.Generator, dead_zone_m: float) -> Taught:
+    """Return the way around an object that is not to be touched (section 4.3, fig. 4.15 right)."""
+    del rng
+    return _taught_along_file("object-3d", dead_zone_m)
+
+
 def as_taught(taught: Taught, rng: np.random.Generator) -> Scenario:
     """Return the path as it was taught."""
     del rng
     return Scenario(taught.path)
+
+
+def unseen_order(taught: Taught, rng: np.random.Generator) -> Scenario:
+    """Return what is taught on the surface in the order of fig. 4.17, which nobody taught."""
+    del rng
+    order = [0, 1, 2, 0, 4, 3]
+    curves = _segments(taught)
+    meant, _ = joined([curves[k] for k in order], _SAMPLE_M)
+    path = Path(meant + taught.path.points[0] - meant[0])
+    return Scenario(
+        path,
+        states=tuple(taught.states[k] for k in order),
+        ends_m=np.cumsum(taught.lengths_m[order]),
+    )
 
 
 def changed_lengths(taught: Taught, rng: np.random.Generator) -> Scenario:
@@ -176,7 +211,12 @@ class AssistedTask(NamedTuple):
     meaning: Meaning
 
 
-FAMILIES: Mapping[str, Family] = {"lines": taught_lines, "curves": taught_curves}
+FAMILIES: Mapping[str, Family] = {
+    "lines": taught_lines,
+    "curves": taught_curves,
+    "surface": taught_on_surface,
+    "object": taught_around_object,
+}
 TASKS: Mapping[str, AssistedTask] = {
     "lines": AssistedTask("lines", as_taught),
     "changed-workspace": AssistedTask("lines", changed_lengths),
@@ -185,6 +225,12 @@ TASKS: Mapping[str, AssistedTask] = {
     "wrong-model": AssistedTask("curves", beside_the_model),
 }
 """Tasks by name; those of a family are taught alike."""
+
+
+def _taught_along_file(name: str, dead_zone_m: float) -> Taught:
+    task = load_task(name).model_copy(update={"dead_zone_m": dead_zone_m})
+    meant = read_csv(find_task(name).with_suffix(".csv"))
+    return _taught(task, [meant.positions[samples] for _, samples in meant.stretches])
 
 
 def _taught(task: Task, curves: Sequence[Sequence[Array] | Array]) -> Taught:

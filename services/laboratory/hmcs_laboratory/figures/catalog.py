@@ -59,6 +59,7 @@ from hmcs_laboratory.figures.fixtures import (
     tasks_of_compliance,
     tubes,
 )
+from hmcs_laboratory.figures.force_tasks import trajectories_of_force_tasks
 from hmcs_laboratory.figures.tasks import (
     DrawnFollowedSettings,
     FollowedSettings,
@@ -72,6 +73,7 @@ from hmcs_laboratory.figures.trajectories import (
     five_state_task,
     typical_trajectories,
 )
+from hmcs_laboratory.studies.force_tasks import ForceTaskSettings
 
 _TRACKED = (
     "The thesis recorded a hand with a magnetic tracker. Here human drawings of the LASA data set "
@@ -393,6 +395,15 @@ FIGURES: tuple[Figure[Any], ...] = (
         stand_in="The thesis recorded a force-controlled manipulator led by hand. Here the "
         "simulated operator performs the five-state task in space; as in the thesis from three "
         "demonstrations, with 25 symbols.",
+    ),
+    Figure(
+        "4.15",
+        "The two tasks with a robot led by its tool",
+        "Representative trajectories: lines and bows on a plane surface, and a way around an "
+        "object that is not touched. Dots mark the change between states.",
+        trajectories_of_force_tasks,
+        ForceTaskSettings(),
+        {"robot": "lag"},
     ),
     Figure(
         "4.16",

@@ -79,7 +79,7 @@ def workspace(settings: ExperimentSettings, rng: np.random.Generator) -> Drawn:
     ax: Any = picture.add_subplot(projection="3d")
     for obstacle in taught.task.workspace.obstacles:
         if obstacle.size_m is not None and obstacle.name != "table":
-            _draw_box(ax, np.array(obstacle.position_m), np.array(obstacle.size_m))
+            draw_box(ax, np.array(obstacle.position_m), np.array(obstacle.size_m), WRONG_COLOR)
     ax.plot(*taught.path.points.T, color=COLORS[0], linewidth=2.2)
     ax.plot(*taught.path.points[0], marker="o", color=INK, ms=7, linestyle="")
     ax.view_init(elev=24, azim=-150)
@@ -260,7 +260,8 @@ def _draw_sphere(ax: Any, obstacle: Sphere) -> None:
     ax.plot_wireframe(*surface, color=WRONG_COLOR, linewidth=0.5)
 
 
-def _draw_box(ax: Any, center: Array, size: Array) -> None:
+def draw_box(ax: Any, center: Array, size: Array, color: str) -> None:
+    """Draw the edges of a box, m, both of shape (3,)."""
     low, high = center - size / 2, center + size / 2
     corners = np.array([[low[k], high[k]] for k in range(3)])
     for axis in range(3):
@@ -270,4 +271,4 @@ def _draw_box(ax: Any, center: Array, size: Array) -> None:
                 edge = np.zeros((3, 2))
                 edge[axis] = corners[axis]
                 edge[others[0]], edge[others[1]] = corners[others[0]][a], corners[others[1]][b]
-                ax.plot(*edge, color=WRONG_COLOR, linewidth=1.0)
+                ax.plot(*edge, color=color, linewidth=1.0)

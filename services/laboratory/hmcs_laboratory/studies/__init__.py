@@ -9,6 +9,7 @@ from hmcs_laboratory.studies.calibration import CALIBRATION
 from hmcs_laboratory.studies.directions import DIRECTIONS
 from hmcs_laboratory.studies.drawings import LASA
 from hmcs_laboratory.studies.experiments import EXPERIMENT_1, EXPERIMENT_2, EXPERIMENT_3
+from hmcs_laboratory.studies.force_tasks import FORCE_TASK_2D, FORCE_TASK_3D
 from hmcs_laboratory.studies.gestemes import (
     GESTEME_COUNT,
     NOISE,
@@ -43,4 +44,6 @@ STUDIES: tuple[Study[Any], ...] = (
     EXPERIMENT_1,
     EXPERIMENT_2,
     EXPERIMENT_3,
+    FORCE_TASK_2D,
+    FORCE_TASK_3D,
 )

@@ -74,7 +74,7 @@ class AssistanceSettings(LoopSettings):
     """All where none is named."""
 
 
-class _Lesson:
+class Lesson:
     """What one operator was taught, and the models learned from it."""
 
     def __init__(self, settings: LoopSettings, family: str, operator: str, seed: int) -> None:
@@ -130,10 +130,10 @@ def measured_in(
     wanted = [law for law in LAWS if law.name in (*settings.law, UNAIDED) or not settings.law]
     for operator in settings.operator:
         seed = seed_from(rng)
-        lessons: dict[str, _Lesson] = {}
+        lessons: dict[str, Lesson] = {}
         for index, (name, task) in enumerate(tasks.items()):
             if task.family not in lessons:
-                lessons[task.family] = _Lesson(settings, task.family, operator, seed)
+                lessons[task.family] = Lesson(settings, task.family, operator, seed)
             lesson = lessons[task.family]
             scenario = task.meaning(lesson.taught, np.random.default_rng([seed, 1000 + index]))
             alone: dict[str, float] = {}
@@ -143,7 +143,7 @@ def measured_in(
                 if known is None:
                     rows.append(Measured(law.name, {**what, **_default(law)}, _nothing()))
                     continue
-                run, spent_s = _performed(
+                run, spent_s = performed(
                     settings, lesson.taught, scenario, law, known[0], operator, seed
                 )
                 measured = measures(run, scenario)
@@ -161,7 +161,7 @@ def measured_in(
     return rows
 
 
-def _performed(
+def performed(
     settings: LoopSettings,
     taught: Taught,
     scenario: Scenario,
@@ -170,8 +170,11 @@ def _performed(
     operator: str,
     seed: int,
 ) -> tuple[Run, float]:
+    """Return how an operator performs a scenario under a law, and the processor time, s.
+
+    With equal seeds the hand errs alike whatever the law.
+    """
     period_s = 1.0 / settings.rate_hz
-    # The hand errs alike whatever the law.
     hand = ClosedLoopOperator(
         PRESETS[operator],
         scenario.meant,

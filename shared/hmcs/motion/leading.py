@@ -1,0 +1,59 @@
+"""A simulated hand that leads a robot by its tool, through a force sensor and an admittance."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.motion.admittance import Admittance
+from hmcs.motion.force_sensing import ForceSensor, Payload, operator_wrench, sensed
+from hmcs.task import Task
+
+FloatArray = NDArray[np.float64]
+
+
+class Led(NamedTuple):
+    """What comes of a push."""
+
+    wrench: FloatArray
+    """The operator's force, N, and torque, N·m, as it was sensed, base frame, shape (6,)."""
+    twist: FloatArray
+    """The velocity it asks for, m/s and rad/s, shape (6,)."""
+
+
+class LeadingHand:
+    """Pushes as hard as the arm needs to go as the hand wants; the sensor has the last word."""
+
+    def __init__(self, admittance: Admittance, payload: Payload, bandwidth_hz: float) -> None:
+        self._admittance = admittance
+        self._payload = payload
+        self._sensor = ForceSensor(bandwidth_hz)
+
+    def push(self, velocity: FloatArray, orientation: FloatArray, elapsed_s: float) -> Led:
+        """Push for `elapsed_s` to go at `velocity`, m/s, shape (3,).
+
+        The tool is turned by the quaternion `orientation`, x y z w, base frame.
+        """
+        wanted = self._admittance.wrench(np.concatenate([velocity, np.zeros(3)]))
+        reading = self._sensor.read(sensed(wanted, self._payload, orientation), elapsed_s)
+        wrench = operator_wrench(reading, self._payload, orientation)
+        return Led(wrench, self._admittance.twist(wrench))
+
+
+def leading_hand(task: Task) -> LeadingHand | None:
+    """Return the hand that leads the robot of a task by its tool; None where it is teleoperated."""
+    if task.robot.mode == "teleoperated":
+        return None
+    set_up = task.robot.cooperation
+    return LeadingHand(
+        Admittance(
+            set_up.force_threshold_n,
+            set_up.torque_threshold_n_m,
+            set_up.m_s_per_n,
+            set_up.rad_s_per_n_m,
+        ),
+        Payload(set_up.tool_mass_kg, set_up.tool_center_m),
+        set_up.sensor_bandwidth_hz,
+    )
