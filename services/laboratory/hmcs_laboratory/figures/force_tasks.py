@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from hmcs_laboratory.assistance.loop import Run
@@ -31,8 +32,8 @@ def trajectories_of_force_tasks(settings: ForceTaskSettings, rng: np.random.Gene
     plane.plot(*run.robot[changes][:, 1:].T, "o", color=INK)
     plane.set_aspect("equal")
     plane.invert_xaxis()
-    plane.set_xlabel("y (m)")
-    plane.set_ylabel("z (m)")
+    plane.set_xlabel("y, m")
+    plane.set_ylabel("z, m")
     plane.set_title("strokes on a surface")
 
     block, led = _one(settings, "object", rng)
@@ -43,6 +44,7 @@ def trajectories_of_force_tasks(settings: ForceTaskSettings, rng: np.random.Gene
     space.plot(*led.robot[_changes(block, led)].T, "o", color=INK)
     space.view_init(elev=24, azim=-150)
     label_space(space, 3)
+    space.xaxis.set_major_locator(MaxNLocator(2))
     space.set_title("around an object")
 
     right = [

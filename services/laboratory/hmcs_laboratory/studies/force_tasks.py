@@ -33,6 +33,7 @@ class ForceTaskSettings(LoopSettings):
     demonstrations: Count = 3
     """As in the thesis, which tested on two others."""
     performances: Count = 2
+    """Others, in which it is measured."""
     dead_zone_m: Positive = 0.01
     """As in the thesis, which normalized samples to be so far apart."""
     robot: str = "physics"
