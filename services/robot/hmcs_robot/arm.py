@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pybullet
 
-from hmcs_robot import rotations
+from hmcs.motion import quaternions
 from hmcs_robot.driver import Array, JointLimits, Pose
 from hmcs_robot.robots import RobotModel
 
@@ -59,10 +59,10 @@ class Arm:
         )
         # The link's own frame (4, 5) has the digits of a float32, that of its mass has them all.
         mass = Pose(np.array(state[0]), np.array(state[1]))
-        back = self._inertial[self._tool_link].orientation * [-1.0, -1.0, -1.0, 1.0]
+        back = quaternions.inverse(self._inertial[self._tool_link].orientation)
         return Pose(
             mass.position + _matrix(mass) @ self._tool_from_mass,
-            rotations.product(mass.orientation, back),
+            quaternions.product(mass.orientation, back),
         )
 
     def jacobian(self, joint_positions: Array) -> Array:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs_robot import rotations
+from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Array, Pose
 from hmcs_robot.limits import (
     Limits,
@@ -133,8 +133,8 @@ def follow(
     followed = slowing * scale * wanted
     pose = Pose(
         arm.tool.position + lag[:3] + followed[:3] * period_s,
-        rotations.turned(
-            rotations.turned(arm.tool.orientation, lag[3:], 1.0), followed[3:], period_s
+        quaternions.turned(
+            quaternions.turned(arm.tool.orientation, lag[3:], 1.0), followed[3:], period_s
         ),
     )
     limited = (
@@ -153,7 +153,7 @@ def _lag(tool: Pose, reference: Pose, tuning: Tuning) -> Array:
         [
             shortened(reference.position - tool.position, tuning.largest_lag_m),
             shortened(
-                rotations.between(tool.orientation, reference.orientation), tuning.largest_lag_rad
+                quaternions.between(tool.orientation, reference.orientation), tuning.largest_lag_rad
             ),
         ]
     )

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from hmcs.errors import UserError
-from hmcs_robot import rotations
+from hmcs.motion import quaternions
 from hmcs_robot.driver import Array, JointLimits, Pose
 
 _ACCURACY_M = 1e-6
@@ -84,7 +84,7 @@ def _descend(arm: Kinematics, target: Pose, start: Array) -> _Solution:
         error = np.concatenate(
             [
                 target.position - tool.position,
-                rotations.between(tool.orientation, target.orientation),
+                quaternions.between(tool.orientation, target.orientation),
             ]
         )
         if float(np.abs(error).max()) < _ACCURACY_M:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmcs.errors import UserError
-from hmcs_robot import rotations
+from hmcs.motion import quaternions
 from hmcs_robot.arm import Arm
 from hmcs_robot.driver import Pose
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
@@ -29,7 +29,7 @@ def test_jacobian_is_the_derivative_of_forward_kinematics(arm: Arm) -> None:
             arm.place(q - step)
             behind = arm.tool()
             linear = (ahead.position - behind.position) / (2 * h)
-            angular = rotations.between(behind.orientation, ahead.orientation) / (2 * h)
+            angular = quaternions.between(behind.orientation, ahead.orientation) / (2 * h)
             assert np.abs(jacobian[:3, joint] - linear).max() < 1e-7
             assert np.abs(jacobian[3:, joint] - angular).max() < 1e-7
 
@@ -60,7 +60,7 @@ def test_inverse_kinematics_is_undone_by_forward_kinematics(robot: str, arm: Arm
         arm.place(found)
         reached = arm.tool()
         assert np.abs(reached.position - target.position).max() < 1e-5
-        assert np.linalg.norm(rotations.between(reached.orientation, target.orientation)) < 1e-4
+        assert np.linalg.norm(quaternions.between(reached.orientation, target.orientation)) < 1e-4
         assert (found >= arm.limits.lower).all()
         assert (found <= arm.limits.upper).all()
 

@@ -46,7 +46,7 @@ class Path:
             raise ValueError(
                 f"points have shape {points.shape}, expected (K, 3) with finite numbers only"
             )
-        arc_length = _arc_length(points)
+        arc_length = arc_length_of(points)
         if not len(points) or not arc_length[-1] > 0:
             raise ValueError("a path needs two different points at least")
         points.flags.writeable = arc_length.flags.writeable = False
@@ -152,7 +152,8 @@ def mean_path(paths: Sequence[ArrayLike], count: int = 100) -> tuple[FloatArray,
     return points, np.sqrt((across**2).sum(axis=-1).mean(axis=0))
 
 
-def _arc_length(points: FloatArray) -> FloatArray:
+def arc_length_of(points: FloatArray) -> FloatArray:
+    """Return the length of the way up to each of the points, m, shapes (T, 3) and (T,)."""
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(pieces)]) if len(points) else pieces
 

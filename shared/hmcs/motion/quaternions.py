@@ -45,6 +45,48 @@ def continuous(quaternions: ArrayLike) -> FloatArray:
     return np.where(turned[:, None], -given, given)
 
 
+def product(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the rotation `right` followed by `left`, x y z w, all of shape (4,)."""
+    x, y, z, w = left.tolist()
+    a, b, c, d = right.tolist()
+    return np.array(
+        [
+            w * a + x * d + y * c - z * b,
+            w * b + y * d + z * a - x * c,
+            w * c + z * d + x * b - y * a,
+            w * d - x * a - y * b - z * c,
+        ]
+    )
+
+
+def inverse(quaternion: FloatArray) -> FloatArray:
+    """Return the rotation back, of a unit quaternion, shape (4,)."""
+    return np.asarray(quaternion * [-1.0, -1.0, -1.0, 1.0])
+
+
+def from_vector(vector: FloatArray) -> FloatArray:
+    """Return the quaternion of the rotation vector `vector`, rad, shape (3,)."""
+    angle = float(np.linalg.norm(vector))
+    # sinc keeps its digits where the angle goes to zero.
+    return np.append(0.5 * np.sinc(angle / (2 * np.pi)) * vector, np.cos(angle / 2))
+
+
+def between(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the rotation vector, base frame, of at most π rad, that turns `start` into `end`."""
+    turn = product(end, inverse(start))
+    if turn[3] < 0:
+        turn = -turn
+    sine = float(np.linalg.norm(turn[:3]))
+    angle = 2 * np.arctan2(sine, turn[3])
+    return np.asarray(turn[:3] * (angle / sine if sine > 1e-12 else 2.0))
+
+
+def turned(orientation: FloatArray, angular_velocity: FloatArray, duration_s: float) -> FloatArray:
+    """Return `orientation` after turning with `angular_velocity`, rad/s, base frame."""
+    result = product(from_vector(angular_velocity * duration_s), orientation)
+    return np.asarray(result / np.linalg.norm(result))
+
+
 def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
     """Return the rotation of a unit quaternion x y z w as a matrix, shape (3, 3).
 
@@ -58,17 +100,3 @@ def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def turn_rad(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the rotation vector, rad, from one orientation to another, in the base frame.
-
-    Both are unit quaternions x y z w, shape (4,).
-    """
-    u, v = after[:3], before[:3]
-    real = float(after @ before)
-    axis = before[3] * u - after[3] * v - np.cross(u, v)
-    if real < 0:
-        real, axis = -real, -axis
-    size = float(np.linalg.norm(axis))
-    return np.asarray(2.0 * math.atan2(size, real) * axis / size if size > 0 else axis)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.motion.quaternions import turn_rad
+from hmcs.motion.quaternions import between
 from hmcs.motion.steps import Step
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ class SensorReader:
         if name == "turn":
             if step.orientation is None or self._orientation is None:
                 return np.full(3, np.nan)
-            return turn_rad(self._orientation, step.orientation)
+            return between(self._orientation, step.orientation)
         if step.wrench is None:
             return np.full(3, np.nan)
         return step.wrench[:3] if name == "force" else step.wrench[3:]

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hmcs.motion.quaternions import turn_rad
+from hmcs.motion.quaternions import between
 from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.learning import learn
@@ -176,8 +176,8 @@ def test_a_turn_is_the_rotation_between_two_orientations(angle_rad: float) -> No
     left = np.array([[c, -z, y, x], [z, c, -x, y], [-y, x, c, z], [-x, -y, -z, c]])
     after = left @ before
     for sign in (1.0, -1.0):
-        np.testing.assert_allclose(turn_rad(before, sign * after), angle_rad * axis, atol=1e-12)
-    np.testing.assert_array_equal(turn_rad(before, before), np.zeros(3))
+        np.testing.assert_allclose(between(before, sign * after), angle_rad * axis, atol=1e-12)
+    np.testing.assert_array_equal(between(before, before), np.zeros(3))
 
 
 def test_the_first_step_has_no_turn_and_one_without_motion_on_the_axes_no_direction() -> None:
