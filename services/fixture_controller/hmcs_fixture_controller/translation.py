@@ -17,7 +17,9 @@ def guides_of(model: Model) -> Guides:
 
     Raises RegionError for a region that cannot be.
     """
-    return Guides(model.paths, rules_of(model.task), regions_of(model.task))
+    return Guides(
+        model.paths, rules_of(model.task), regions_of(model.task), model.spreads, model.turns
+    )
 
 
 def sample_of(motion: Motion, seq: int) -> OperatorSample:

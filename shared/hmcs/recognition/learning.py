@@ -9,9 +9,10 @@ import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import mean_path
+from hmcs.motion.turns import mean_turns
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import DEFAULT, Lesson, kind_named
-from hmcs.recognition.segments import LearningError, segments_of
+from hmcs.recognition.segments import Array, LearningError, Segment, segments_of
 from hmcs.task import Task
 
 
@@ -53,6 +54,7 @@ def learn(
         progress,
     )
     knowledge = kind.learn(lesson)
+    turns = tuple(map(_turns, by_gesteme))
     paths = [mean_path([segment.positions for segment in own]) for own in by_gesteme]
     return Model(
         name=task.name,
@@ -63,4 +65,13 @@ def learn(
         path_points=tuple(points for points, _ in paths),
         path_spreads=tuple(spread for _, spread in paths),
         demonstrations=tuple(d.name for d in demonstrations),
+        path_turns=turns if any(turn is not None for turn in turns) else (),
     )
+
+
+def _turns(segments: Sequence[Segment]) -> Array | None:
+    """How the hand turns along a gesteme's path, (K, 4); None unless every performance tells."""
+    orientations = [s.orientations for s in segments if s.orientations is not None]
+    if len(orientations) < len(segments):
+        return None
+    return mean_turns([segment.positions for segment in segments], orientations)

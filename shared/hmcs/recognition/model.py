@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.paths import Path
+from hmcs.motion.turns import Turns
 from hmcs.task import AXES, Task
 
 
@@ -29,6 +30,9 @@ class Model(NamedTuple):
     """For each gesteme the lateral RMS of the demonstrations about it, m, shape (K,)."""
     demonstrations: tuple[str, ...]
     """Names of the demonstrations it was learned from."""
+    path_turns: tuple[NDArray[np.float64] | None, ...] = ()
+    """For each gesteme how the hand turns along its path, x y z w since its beginning, shape
+    (K, 4); None where demonstrations do not tell. Empty where none does."""
 
     @property
     def gesteme_names(self) -> tuple[str, ...]:
@@ -54,6 +58,12 @@ class Model(NamedTuple):
     def spreads(self) -> dict[str, NDArray[np.float64]]:
         """The spread along each path, m."""
         return dict(zip(self.gesteme_names, self.path_spreads, strict=True))
+
+    @property
+    def turns(self) -> dict[str, Turns]:
+        """How the hand turns along the path of each gesteme that tells."""
+        told = zip(self.gesteme_names, self.path_turns, strict=False)
+        return {name: Turns(turns) for name, turns in told if turns is not None}
 
 
 def axes_of(task: Task) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ from hmcs.task import Task
 FORMAT = "hmcs-model/1"
 
 _MANIFEST, _ARRAYS = "model.json", "arrays/"
-_PATH, _SPREAD = "guide.path.", "guide.spread."
+_PATH, _SPREAD, _TURN = "guide.path.", "guide.spread.", "guide.turn."
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -114,6 +114,7 @@ def _model(source: Path, fields: Any, arrays: dict[str, AnyArray]) -> Model:
         count = len(manifest.task.gestemes)
         paths = tuple(arrays.pop(f"{_PATH}{k}") for k in range(count))
         spreads = tuple(arrays.pop(f"{_SPREAD}{k}") for k in range(count))
+        turns = tuple(arrays.pop(f"{_TURN}{k}", None) for k in range(count))
         knowledge: Any = put_together(kind.knowledge, Content(manifest.knowledge, arrays))
         kind.check(knowledge, manifest.task)
     except KeyError as error:
@@ -131,6 +132,7 @@ def _model(source: Path, fields: Any, arrays: dict[str, AnyArray]) -> Model:
         path_points=paths,
         path_spreads=spreads,
         demonstrations=manifest.demonstrations,
+        path_turns=() if all(turn is None for turn in turns) else turns,
     )
     _check_guides(source, model)
     if _digest(model) != model.hash:
@@ -144,6 +146,9 @@ def _check_guides(source: Path, model: Model) -> None:
             f"{_PATH}{k}": (points, (len(points), 3)),
             f"{_SPREAD}{k}": (spread, points.shape[:1]),
         }
+        turns = model.path_turns[k] if model.path_turns else None
+        if turns is not None:
+            expected[f"{_TURN}{k}"] = (turns, (len(turns), 4))
         for name, (array, shape) in expected.items():
             if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
                 raise ModelFileError(
@@ -158,6 +163,9 @@ def _parts(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     arrays = dict(content.arrays)
     for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
         arrays |= {f"{_PATH}{k}": points, f"{_SPREAD}{k}": spread}
+    for k, turns in enumerate(model.path_turns):
+        if turns is not None:
+            arrays[f"{_TURN}{k}"] = turns
     manifest = Manifest(
         format=FORMAT,
         recognizer=model.recognizer,

@@ -34,6 +34,8 @@ class Segment(NamedTuple):
     steps: tuple[Step, ...]
     after: Array | None = None
     """Displacement of the step that followed it, m, shape (3,); None where none is known."""
+    orientations: Array | None = None
+    """Of the hand, x y z w, shape (T, 4); None where they were not recorded."""
 
     def motion(self, axes: Sequence[int]) -> Motion:
         """Return the motion along these axes, from its own origin."""
@@ -105,7 +107,16 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
             state, gesteme = _meant(task, label, demonstration.name)
             if own and samples.start == last:
                 own[-1] = own[-1]._replace(after=steps[0].displacement)
-            own.append(Segment(demonstration.name, state, gesteme, positions, steps))
+            own.append(
+                Segment(
+                    demonstration.name,
+                    state,
+                    gesteme,
+                    positions,
+                    steps,
+                    orientations=piece.orientations,
+                )
+            )
             last = samples.stop - 1
         segments += own
         if not labeled:

@@ -68,13 +68,17 @@ class VolumeKnot(Part):
 class VolumeSetup(Part):
     """A tube (one knot), a cone (two), or several joined, along the learned path."""
 
-    knots: Annotated[tuple[VolumeKnot, ...], Field(min_length=1)]
+    knots: tuple[VolumeKnot, ...] = ()
     """By rising progress."""
+    of_spread: Positive | None = None
+    """Radius as so many times the spread of the demonstrations; knots, if given, are the least."""
     wall_m: Positive = 0.005
     """Over so much beyond the radius the fixture becomes as stiff as it gets."""
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
+        if not self.knots and self.of_spread is None:
+            raise ValueError("a volume has no radius: give knots, or of_spread")
         places = [knot.progress for knot in self.knots]
         if any(after <= before for before, after in pairwise(places)):
             raise ValueError(f"knots are at {places}, expected rising progress")
@@ -137,6 +141,8 @@ class StateFixture(Part):
     cue: Cue | None = None
     pull: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = None
     volume: VolumeSetup | None = None
+    tight_spread_m: Positive | None = None
+    guides_turning: bool | None = None
     target: TargetSetup | None = None
     plan: PlanSetup | None = None
     shared: SharedSetup | None = None
@@ -169,6 +175,11 @@ class FixtureSetup(Part):
     volume: VolumeSetup | None = None
     """Within it the fixture is free, and it brings back who leaves; none makes the path the guide.
     """
+    tight_spread_m: Positive | None = None
+    """Where demonstrations lay farther apart than this, the fixture is softer in proportion; left
+    out, it is as stiff everywhere."""
+    guides_turning: bool = True
+    """Whether the tool is led to turn as it was shown, where the demonstrations tell that."""
     maximum_factor: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.83
     """ξ of (3.6): the fixturing factor when the recognition is certain."""
     gain_rise_per_s: Positive = 6.0

@@ -187,7 +187,7 @@ def _narrow_volumes(draft: Draft) -> Iterator[Contradiction]:
     if draft.fixture is not None:
         places.insert(0, (("fixture", "volume"), draft.fixture.volume))
     for location, volume in places:
-        if volume is None or draft.dead_zone_m is None:
+        if volume is None or draft.dead_zone_m is None or volume.of_spread is not None:
             continue
         widest_m = max(knot.radius_m for knot in volume.knots)
         if widest_m < draft.dead_zone_m:

@@ -360,7 +360,7 @@ def test_a_fixture_that_cannot_be_is_told_with_its_line(
         ("shared: {operator_axes: [vx]}", "need a plan"),
         ("plan: {}, shared: {operator_axes: [vx, vx]}", "each once"),
         ("plan: {}, target: {position_m: [0, 0, 0.5]}", "give one of them"),
-        ("volume: {knots: []}", "at least 1"),
+        ("volume: {knots: []}", "no radius"),
     ],
 )
 def test_a_states_fixture_that_contradicts_itself_is_told(

@@ -76,7 +76,8 @@ def perform(
     """
     leading = leading_hand(model.task)
     controller = Controller(Safeguards())
-    controller.load(model.name, Guides(model.paths, rules, regions_of(model.task)))
+    guides = Guides(model.paths, rules, regions_of(model.task), model.spreads, model.turns)
+    controller.load(model.name, guides)
     controller.activate(model.name)
     recognizer = recognizer_of(model)
     zone = DeadZone(model.task.dead_zone_m)
@@ -89,7 +90,7 @@ def perform(
     controller.sampled(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
     for tick in range(1, int(most_s / period_s) + 1):
         now_s, tool = tick * period_s, robot.position
-        controller.robot_moved(now_s, tool)
+        controller.robot_moved(now_s, tool, robot.orientation)
         motion = operator.step(tool)
         if motion.arrived:
             arrived = True
