@@ -6,12 +6,21 @@ no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
 
 from __future__ import annotations
 
+from itertools import combinations
+from typing import Any
+
 import numpy as np
 import pybullet
 
 from hmcs.motion import quaternions
 from hmcs_robot.driver import Array, JointLimits, Pose
 from hmcs_robot.robots import RobotModel
+
+BASE_LINK = -1
+JOINTS_BETWEEN = 3
+"""Links with fewer joints between them cannot be brought together within the joints' ranges."""
+CLEAR_AT_HOME_M = 0.02
+"""Links that are nearer at home are built so."""
 
 
 class Arm:
@@ -43,9 +52,28 @@ class Arm:
         self._movable = len(movable)
         self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
         self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
+        self.apart = self._far_links(infos, turning, model)
         inertial = self._inertial[self._tool_link]
         in_link = np.array([0.0, 0.0, model.tool_offset_m]) - inertial.position
         self._tool_from_mass: Array = _matrix(inertial).T @ in_link
+
+    def _far_links(
+        self, infos: list[Any], turning: list[Any], model: RobotModel
+    ) -> list[tuple[int, int]]:
+        """Pairs of links with so many joints between them that they may meet but do not at home."""
+        self.place(np.array(model.home))
+        joints_below = {BASE_LINK: 0}
+        for info in infos:
+            joints_below[info[0]] = joints_below[info[16]] + (info in turning)
+        links = sorted(joints_below)
+        return [
+            (one, other)
+            for one, other in combinations(links, 2)
+            if abs(joints_below[one] - joints_below[other]) >= JOINTS_BETWEEN
+            and not pybullet.getClosestPoints(
+                self.body, self.body, CLEAR_AT_HOME_M, one, other, physicsClientId=self._client
+            )
+        ]
 
     def place(self, joint_positions: Array) -> None:
         """Put the arm at `joint_positions`, rad, shape (n,), at rest."""
@@ -73,6 +101,8 @@ class Arm:
         self, link: int, point: Array, normal: Array, joint_positions: Array
     ) -> Array:
         """Return how `point` of `link`, m, base frame, moves along `normal`, m/rad, shape (n,)."""
+        if link == BASE_LINK:
+            return np.zeros(len(self.joints))
         state = pybullet.getLinkState(
             self.body, link, computeForwardKinematics=True, physicsClientId=self._client
         )

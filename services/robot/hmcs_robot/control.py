@@ -34,6 +34,9 @@ class Tuning:
 
     damping: float = 0.02
     """λ of the damped least squares."""
+    slowest_share: float = 0.25
+    """On its way into a singularity (smallest singular value below 2λ) the tool slows down in
+    proportion, never below this share of its speed."""
     correction_per_s: float = 10.0
     """Rate at which the tool is drawn to its reference pose, and a standing arm to its place."""
     largest_lag_m: float = 0.005
@@ -52,6 +55,8 @@ class Following(NamedTuple):
     """Where the tool should be by now."""
     twist: Array
     """The limited velocity it follows, shape (6,)."""
+    smallest: float = 0.0
+    """Singular value of the Jacobian at the tick before."""
 
 
 class Standing(NamedTuple):
@@ -115,11 +120,15 @@ def follow(
     fast_enough = within_speed(twist, limits)
     reachable = within_acceleration(fast_enough, carried.twist, limits, period_s)
     wanted = within_walls(reachable, arm.tool.position, limits)
+    inverse = _Inverse(arm.jacobian, tuning.damping)
+    walled = _differ(wanted, reachable)
+    clear = inverse.smallest / (2 * tuning.damping)
+    if inverse.smallest < carried.smallest:
+        wanted = wanted * min(1.0, max(clear, tuning.slowest_share))
 
     lag = _lag(arm.tool, carried.pose, tuning)
     drawn = within_speed(wanted + tuning.correction_per_s * lag, limits)
     drawn = within_walls(drawn, arm.tool.position, limits)
-    inverse = _Inverse(arm.jacobian, tuning.damping)
     bounds = bounds_of(arm, limits)
     led = inverse.velocities(wanted)
     scale, bound = bounds.scale(np.zeros_like(led), led)
@@ -140,11 +149,15 @@ def follow(
     limited = (
         *(("speed",) if _differ(fast_enough, twist) else ()),
         *(("acceleration",) if _differ(reachable, fast_enough) else ()),
-        *(("workspace",) if _differ(wanted, reachable) else ()),
-        *(("singularity",) if inverse.smallest < 2 * tuning.damping else ()),
+        *(("workspace",) if walled else ()),
+        *(("singularity",) if clear < 1.0 else ()),
         *bound,
     )
-    return Motion(slowing * velocities, Following(pose, followed), tuple(dict.fromkeys(limited)))
+    return Motion(
+        slowing * velocities,
+        Following(pose, followed, inverse.smallest),
+        tuple(dict.fromkeys(limited)),
+    )
 
 
 def _lag(tool: Pose, reference: Pose, tuning: Tuning) -> Array:

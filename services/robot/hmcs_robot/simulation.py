@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import pybullet
 
 from hmcs.errors import UserError
 from hmcs.task import Obstacle
-from hmcs_robot.arm import Arm
+from hmcs_robot.arm import BASE_LINK, Arm
 from hmcs_robot.driver import ArmState, Array, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
 from hmcs_robot.robots import ROBOTS
@@ -17,7 +18,10 @@ from hmcs_robot.robots import ROBOTS
 _GRAVITY_M_S2 = 9.81
 _TOUCHING_M = 0.0005
 """Nearer than this counts as contact: the solver keeps bodies about so far apart."""
-_BASE_LINK = -1
+_SELF_MARGIN_M = 0.005
+"""Links of the arm itself are kept so far apart: nothing in the physics would."""
+ITSELF = "itself"
+"""What an arm touches whose own links meet."""
 
 
 class StartPoseError(UserError):
@@ -38,7 +42,7 @@ class Simulation:
     """An arm that is moved by its joints' motors, each with the torque it has.
 
     One `move` is one step of the physics of `period_s`. The arm and the obstacles collide; the arm
-    does not collide with itself. Raises UnreachablePoseError where the arm cannot reach the start
+    stops where its own links meet. Raises UnreachablePoseError where the arm cannot reach the start
     pose, StartPoseError where it touches an obstacle there, UserError where no window opens.
     """
 
@@ -76,6 +80,12 @@ class Simulation:
                 physicsClientId=self._client,
             )
         touched = self.read().contacts
+        if ITSELF in touched:
+            self.close()
+            raise StartPoseError(
+                f"robot {scene.robot} touches itself at the start pose of the task: choose another "
+                "tool_start_m or tool_orientation_xyzw"
+            )
         if touched:
             self.close()
             raise StartPoseError(
@@ -124,7 +134,7 @@ class Simulation:
                 self.arm.body, body, self._reach_m, physicsClientId=self._client
             ):
                 link, on_arm, normal, distance = point[3], point[5], point[7], point[8]
-                if link == _BASE_LINK:
+                if link == BASE_LINK:
                     continue
                 if nearest is None or distance < nearest.distance_m:
                     nearest = Nearest(name, distance)
@@ -137,7 +147,23 @@ class Simulation:
                             ),
                         )
                     )
-        return nearest, tuple(touches)
+        return nearest, (*touches, *self._meeting_links(positions))
+
+    def _meeting_links(self, positions: Array) -> Iterator[Touch]:
+        for one, other in self.arm.apart:
+            for point in pybullet.getClosestPoints(
+                self.arm.body,
+                self.arm.body,
+                _SELF_MARGIN_M,
+                one,
+                other,
+                physicsClientId=self._client,
+            ):
+                normal = np.array(point[7])
+                parting = self.arm.separation_per_joint(
+                    one, np.array(point[5]), normal, positions
+                ) - self.arm.separation_per_joint(other, np.array(point[6]), normal, positions)
+                yield Touch(ITSELF, parting)
 
 
 def start_posture(robot: str, start: Pose) -> Array:

@@ -177,3 +177,22 @@ def test_the_reference_never_runs_far_ahead_of_an_arm_that_is_stuck(bench: Any) 
     assert isinstance(rig.carried, Following)
     ahead = np.linalg.norm(rig.carried.pose.position - arm.tool.position)
     assert ahead <= rig.tuning.largest_lag_m + 0.25 / 240 + 1e-9
+
+
+def test_near_a_singularity_the_tool_slows_down_and_comes_out_again(bench: Any) -> None:
+    rig = bench("puma560", half_m=1.0)
+    speeds, clear = [], []
+    # Straight out until the elbow is stretched, then back.
+    for cycle in range(2400):
+        motion = rig.follow([0.15 if cycle < 1200 else -0.15, 0, 0, 0, 0, 0])
+        jacobian = rig.simulation.read().jacobian
+        speeds.append(float(np.linalg.norm(motion.reference_twist[:3])))
+        clear.append(float(np.linalg.svd(jacobian, compute_uv=False)[-1]))
+    near = np.array(clear) < 2 * rig.tuning.damping
+    assert near[:1200].any()
+    assert not near[-1]
+    closing = np.diff(clear, prepend=clear[0]) < 0
+    allowed = 0.15 * np.clip(np.array(clear) / (2 * rig.tuning.damping), 0.25, 1.0)
+    slowed = closing[:-1] & near[:-1]
+    assert slowed.sum() > 20
+    assert (np.array(speeds)[1:][slowed] <= allowed[:-1][slowed] + 1e-3).all()

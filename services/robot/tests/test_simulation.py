@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hmcs.task import Obstacle
-from hmcs_robot.driver import Pose
+from hmcs_robot.driver import Pose, Touch
 from hmcs_robot.kinematics import UnreachablePoseError
+from hmcs_robot.limits import bounds_of
 from hmcs_robot.simulation import Scene, Simulation, StartPoseError
 
 WALL = Obstacle(name="wall", shape="box", position_m=(0.60, 0.25, 0.50), size_m=(0.3, 0.1, 0.3))
@@ -107,3 +108,38 @@ def test_the_arm_begins_at_rest_at_the_start_pose(
     arm = bench(robot).simulation.read()
     assert arm.tool.position == pytest.approx(starts[robot].position, abs=1e-5)
     assert not arm.joint_velocities.any()
+
+
+def test_an_arm_whose_own_links_meet_touches_itself_and_can_part_them(
+    bench: Any, robot: str
+) -> None:
+    simulation = bench(robot).simulation
+    assert simulation.read().contacts == ()
+    random, limits = np.random.default_rng(1), simulation.limits
+    for _ in range(4000):
+        posture = random.uniform(limits.lower, limits.upper)
+        simulation.arm.place(posture)
+        touches = simulation.read().touches
+        if len(touches) == 1:
+            break
+    assert [touch.name for touch in touches] == ["itself"]
+    (touch,) = touches
+    parting = touch.separation_per_joint / np.linalg.norm(touch.separation_per_joint)
+
+    def meets(along: float) -> bool:
+        simulation.arm.place(posture + along * parting)
+        return "itself" in simulation.read().contacts
+
+    assert meets(-0.005)
+    assert any(not meets(along) for along in np.linspace(0.0, 0.4, 41))
+
+
+def test_links_that_meet_cannot_be_pressed_together(bench: Any) -> None:
+    rig = bench("puma560")
+    state = rig.simulation.read()
+    parting = np.zeros(len(state.joint_positions))
+    parting[1] = -1.0
+    bounds = bounds_of(state._replace(touches=(Touch("itself", parting),)), rig.limits)
+    pressing, opening = -0.3 * parting, 0.3 * parting
+    assert bounds.scale(np.zeros_like(pressing), pressing)[0] < 0.01
+    assert bounds.scale(np.zeros_like(opening), opening)[0] == 1.0
