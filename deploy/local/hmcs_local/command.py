@@ -301,14 +301,27 @@ def figures(
 @task_app.command()
 def check(
     file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],
+    demonstrations: Annotated[
+        list[str] | None,
+        typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER: whether they fit it and agree."),
+    ] = None,
 ) -> None:
     """Name every problem of a task file, with line and field; exit code 2 where there is one."""
     from hmcs.fixtures.workspace import check_workspace
+    from hmcs.recognition.disagreement import check_agreement
+    from hmcs.recognition.segments import segments_of
     from hmcs.task import load_task
+    from hmcs_trainer.references import read_references
 
     task = load_task(file)
     check_workspace(file, task)
-    typer.echo(f"{file}: in order: {len(task.gestemes)} gestemes, {len(task.states)} states")
+    shown = ""
+    if demonstrations:
+        read = read_references(demonstrations, task)
+        check_agreement(task, segments_of(task, read))
+        shown = f"; {len(read)} demonstrations agree"
+    counts = f"{len(task.gestemes)} gestemes, {len(task.states)} states"
+    typer.echo(f"{file}: in order: {counts}{shown}")
 
 
 @app.command()

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.bus.keys import check_name
+from hmcs.recognition.disagreement import check_agreement
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.recognizers import DEFAULT, kind_named, settings_of
+from hmcs.recognition.segments import segments_of
 from hmcs.recognition.selection import choose
 from hmcs.task import load_task
 from hmcs_trainer.references import read_references
@@ -43,6 +45,7 @@ def train(
         check_name("model", name)
     progress("reading demonstrations")
     demonstrations = read_references(references, loaded)
+    check_agreement(loaded, segments_of(loaded, demonstrations))
     if choices:
         selection = choose(
             loaded,
