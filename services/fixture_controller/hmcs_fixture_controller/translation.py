@@ -76,9 +76,13 @@ def state_of(fixture: Fixture) -> FixtureState:
         compliance=fixture.gains.compliance,
         preferred_direction=fixture.direction,
         progress=fixture.progress,
+        gesteme=fixture.gesteme,
+        guide_origin=fixture.guide_origin,
+        off_guide_m=fixture.off_guide_m,
         operator_twist=fixture.operator_twist,
         command_twist=fixture.command_twist,
         wrench=fixture.wrench,
         engaged=fixture.engaged,
+        asks_for_help=fixture.asks_for_help,
         reason=fixture.reason,
     )

@@ -129,6 +129,7 @@ class FixtureState(Message):
     """What the fixture is doing, and why."""
 
     SCHEMA = "fixture_state"
+    VERSION = 2
 
     law: Name
     """The law that made the command."""
@@ -144,6 +145,13 @@ class FixtureState(Message):
     """Unit vector, or zero in free motion, shape (3,)."""
     progress: Annotated[float, Field(ge=0, le=1)]
     """How far along the state's learned path, by path length."""
+    gesteme: str = ""
+    """Whose learned path it is; empty in free motion."""
+    guide_origin: Vector3 | None = None
+    """Where that path begins for the robot, m, base frame, shape (3,); None in free motion, and
+    where nobody knows."""
+    off_guide_m: Annotated[float, Field(ge=0)] | None = None
+    """How far the robot is beside the path; None as for `guide_origin`."""
     operator_twist: Vector6
     """The operator's velocity as the law saw it, shape (6,)."""
     command_twist: Vector6
@@ -152,6 +160,8 @@ class FixtureState(Message):
     """The fixture's force on the operator, for a haptic device, N and N·m, shape (6,)."""
     engaged: bool
     """Whether the operator is driving."""
+    asks_for_help: bool = False
+    """True while a plan with shared axes is stuck and waits for the operator."""
     reason: Literal[
         "guiding",
         "unsure",
