@@ -15,15 +15,18 @@ from hmcs.bus.messages import (
     LastStepsQuestion,
     LoadModel,
     Motion,
+    Record,
     Refusal,
+    RobotLooks,
     SettingsReport,
     Step,
+    Train,
 )
 from hmcs.bus.qos import STANCES, Stance
 
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
-    ActivateRecognizer, Done,
+    ActivateRecognizer, RobotLooks, Record, Train, Done,
 }  # fmt: skip
 
 

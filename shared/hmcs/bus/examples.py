@@ -14,18 +14,24 @@ from hmcs.bus.messages import (
     Envelope,
     Evidence,
     FixtureState,
+    Handle,
     Health,
+    Label,
     LastSteps,
     LastStepsQuestion,
     LoadModel,
     Message,
     Motion,
     Origin,
+    Record,
     Refusal,
+    RobotLooks,
     RobotState,
     SettingsReport,
     Source,
     Step,
+    Train,
+    TrainingProgress,
 )
 
 ORIGIN = Origin(boot="5f0c1d2e3a4b", seq=1041, captured_ns=86_400_000_000_123)
@@ -114,6 +120,22 @@ EXAMPLES: tuple[Message, ...] = (
         stop="none",
         limited=("speed", "joint_3"),
     ),
+    Handle(
+        operator="page-1",
+        position=np.array([0.02, -0.01, 0.05]),
+        dead_man=True,
+        clutch=True,
+        pedal=True,
+    ),
+    Label(state="follow", clock="5f0c1d2e3a4b", step=41),
+    TrainingProgress(
+        model="demo",
+        stage="done",
+        detail="3 gestemes from 3 demonstrations",
+        share=1.0,
+        path="/models/demo.hmcs",
+        report="/models/demo.html",
+    ),
     Ask(),
     Refusal(reason="no model named 'demo-2': load one of demo, lines"),
     Health(
@@ -140,6 +162,19 @@ EXAMPLES: tuple[Message, ...] = (
     LastSteps(clock="5f0c1d2e3a4b", steps=(_STEP,), origins=(ORIGIN,)),
     LoadModel(path="/models/demo.hmcs"),
     ActivateRecognizer(model="demo"),
+    RobotLooks(
+        robot="puma560",
+        urdf='<robot name="puma560"/>',
+        joints=("joint_1", "joint_2"),
+        files={"arm.stl": b"solid"},
+    ),
+    Record(on=True, name="take-1"),
+    Train(
+        model="demo",
+        task="human-shapes",
+        demonstrations=("take-1.mcap", "take-2.csv"),
+        recognizer="segment-filter",
+    ),
     Done(detail="following demo"),
 )
 """One of each, every optional field filled."""

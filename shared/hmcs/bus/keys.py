@@ -81,6 +81,26 @@ class Keys:
         """RobotState, robot to all."""
         return self._key("robot", "state")
 
+    @property
+    def handle(self) -> str:
+        """Handle, the operator's page to the input device."""
+        return self._key("input", "handle")
+
+    @property
+    def label(self) -> str:
+        """Label, whoever hears the operator to the recorder."""
+        return self._key("input", "label")
+
+    @property
+    def training(self) -> str:
+        """TrainingProgress, trainer to all."""
+        return self._key("trainer", "progress")
+
+    @property
+    def everything(self) -> str:
+        """Whatever is published in the cell."""
+        return self._key("**")
+
     def evidence(self, model: str, instance: str = ANY) -> str:
         """Evidence, a classifier to the task HMM of the same model."""
         return self._key("model", _chunk("model", model), "evidence", _chunk("instance", instance))

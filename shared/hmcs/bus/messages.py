@@ -125,6 +125,23 @@ class Command(Message):
     False and then True: a deliberate re-engage."""
 
 
+class Handle(Message):
+    """What an operator's page does with its handle; an input device makes Motion of it."""
+
+    SCHEMA = "handle"
+
+    operator: Name
+    """Who holds it: one page of one console. Another's is refused until this one has lapsed."""
+    position: Vector3
+    """Of the handle, m, operator frame, shape (3,)."""
+    dead_man: bool
+    """True while it is held."""
+    clutch: bool = False
+    """True while the handle is being repositioned."""
+    pedal: bool = False
+    """The page's pedal key."""
+
+
 class FixtureState(Message):
     """What the fixture is doing, and why."""
 
@@ -305,6 +322,41 @@ class Belief(Message):
         return float(self.probabilities.max())
 
 
+# --- teaching: what the operator says of the motion, and what becomes of it -----------------------
+
+
+class Label(Message):
+    """The operator says in which state of the task the hand is from now on."""
+
+    SCHEMA = "label"
+
+    state: str
+    """A task state, or `state/gesteme` where a state has several; empty ends what was labeled."""
+    clock: str = ""
+    """Boot of the input device whose steps are meant; empty where none was heard of."""
+    step: Count = 0
+    """The first step the label is true of."""
+
+
+class TrainingProgress(Message):
+    """How far a training is."""
+
+    SCHEMA = "training_progress"
+
+    model: Name
+    """What the model is to be called."""
+    stage: Literal["checking", "learning", "judging", "done", "failed", "canceled"]
+    """What is being done; the last three end it."""
+    detail: str
+    """One line: what is done now, or what came of it, or what was wrong."""
+    share: Annotated[float, Field(ge=0, le=1)]
+    """Of the whole that is done."""
+    path: str = ""
+    """Of the model file, once it is written; as the trainer sees it."""
+    report: str = ""
+    """Of the report page beside it."""
+
+
 # --- questions and answers ------------------------------------------------------------------------
 
 
@@ -418,6 +470,47 @@ class ActivateRecognizer(Message):
     """The `{model}` of its keys."""
 
 
+class RobotLooks(Message):
+    """How a robot looks: what is needed to draw it."""
+
+    SCHEMA = "robot_looks"
+
+    robot: Name
+    """Which robot, e.g. `puma560`."""
+    urdf: str
+    """The robot's description; files it names are in `files`."""
+    joints: tuple[str, ...]
+    """Names in the URDF of the joints of `joint_positions`, in their order."""
+    files: dict[str, bytes]
+    """Meshes by the name the URDF gives them."""
+
+
+class Record(Message):
+    """Asks the recorder to begin or to end a recording."""
+
+    SCHEMA = "record"
+
+    on: bool
+    """True begins one, False ends it."""
+    name: str = ""
+    """Of the file; by date and time where it is empty."""
+
+
+class Train(Message):
+    """Asks the trainer to learn a model from recordings or demonstrations."""
+
+    SCHEMA = "train"
+
+    model: Name
+    """What it is to be called."""
+    task: str
+    """Name of a task that comes along, or path of a task file, as the trainer sees it."""
+    demonstrations: tuple[str, ...]
+    """Recordings and CSV files, as the trainer sees them."""
+    recognizer: str = ""
+    """Kind of recognizer; the default one where it is empty."""
+
+
 class Done(Message):
     """The answer to a request that was carried out."""
 
@@ -435,6 +528,9 @@ MESSAGES: tuple[type[Message], ...] = (
     Command,
     FixtureState,
     RobotState,
+    Handle,
+    Label,
+    TrainingProgress,
     Ask,
     Refusal,
     Health,
@@ -444,6 +540,9 @@ MESSAGES: tuple[type[Message], ...] = (
     LastSteps,
     LoadModel,
     ActivateRecognizer,
+    RobotLooks,
+    Record,
+    Train,
     Done,
 )
 """Every message there is, for schemas, golden bytes and tables."""

@@ -13,10 +13,13 @@ from hmcs.bus.messages import (
     Command,
     Evidence,
     FixtureState,
+    Handle,
+    Label,
     Message,
     Motion,
     RobotState,
     Step,
+    TrainingProgress,
 )
 
 Priority = Literal["real_time", "interactive_high", "data_high", "data", "data_low"]
@@ -62,6 +65,18 @@ STANCES: dict[type[Message], Stance] = {
     RobotState: Stance(
         "data_high", "drop", "reliable", "newest_wins",
         "The fixture wants the pose as it is now; only what moves the robot goes first.",
+    ),
+    Handle: Stance(
+        "interactive_high", "drop", "reliable", "newest_wins",
+        "The handle as it is now; a page is no real-time device, and goes behind those.",
+    ),
+    Label: Stance(
+        "data_high", "drop", "reliable", "every_one",
+        "Rare and said once by a person: each is to be written down, in order.",
+    ),
+    TrainingProgress: Stance(
+        "data_low", "drop", "reliable", "every_one",
+        "For people who watch a training; behind everything that moves or is recorded.",
     ),
 }  # fmt: skip
 """The stance of every published message; questions and answers travel by Zenoh's queries."""

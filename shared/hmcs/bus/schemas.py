@@ -9,6 +9,7 @@ up to date: peers of that version are out there, and anything else needs a new o
 from __future__ import annotations
 
 import argparse
+import base64
 import json
 import sys
 from collections.abc import Iterator, Sequence
@@ -101,6 +102,8 @@ def _readable(value: Any) -> Any:
             numbers = np.frombuffer(value["data"], value["dtype"]).reshape(value["shape"])
             return {"dtype": value["dtype"], "shape": value["shape"], "data": numbers.tolist()}
         return {name: _readable(part) for name, part in value.items()}
+    if isinstance(value, bytes):
+        return {"base64": base64.b64encode(value).decode()}
     if isinstance(value, list):
         return [_readable(part) for part in value]
     return value

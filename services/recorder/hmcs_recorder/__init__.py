@@ -1,0 +1,1 @@
+"""Recordings: written while the stack runs, read, exported and replayed afterwards."""
