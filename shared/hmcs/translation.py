@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hmcs.bus import messages
+from hmcs.fixtures.controller import Guides, OperatorSample
+from hmcs.fixtures.rules import rules_of
+from hmcs.fixtures.trust import SegmentBelief
+from hmcs.fixtures.workspace import regions_of
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
@@ -29,4 +35,49 @@ def belief_message(model: Model, recognition: Recognition, clock: str) -> messag
         mean_log_likelihood=recognition.mean_log_likelihood,
         unknown_alarm=recognition.unknown_alarm,
         missing_gestemes=tuple(model.gesteme_names[g] for g in belief.missing),
+    )
+
+
+def guides_of(model: Model) -> Guides:
+    """Return the paths a model learned, and the rules and forbidden regions of its task.
+
+    Raises RegionError for a region that cannot be.
+    """
+    return Guides(
+        model.paths, rules_of(model.task), regions_of(model.task), model.spreads, model.turns
+    )
+
+
+def sample_of(motion: messages.Motion, seq: int) -> OperatorSample:
+    """Return a Motion as the controller takes it; a device without rotation does not rotate."""
+    angular = np.zeros(3) if motion.angular_velocity is None else motion.angular_velocity
+    return OperatorSample(
+        number=seq,
+        position=motion.position,
+        twist=np.concatenate([motion.velocity, angular]),
+        dead_man=motion.dead_man,
+        clutch=motion.clutch,
+        pedal=motion.pedal,
+    )
+
+
+def segment_belief_of(belief: messages.Belief) -> SegmentBelief:
+    """Return what a fixture wants to know of a belief.
+
+    Raises ValueError where it has no states, or not one probability for each.
+    """
+    if not belief.states or len(belief.states) != len(belief.probabilities):
+        raise ValueError(
+            f"{len(belief.probabilities)} probabilities for {len(belief.states)} states, "
+            "expected one for each"
+        )
+    return SegmentBelief(
+        step=belief.step,
+        state=belief.likely_state,
+        probability=belief.confidence,
+        gesteme=belief.likely_gesteme,
+        segment_start=belief.segment_start,
+        unknown=belief.unknown,
+        unknown_alarm=belief.unknown_alarm,
+        complete=not belief.missing_gestemes,
     )

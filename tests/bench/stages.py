@@ -26,7 +26,8 @@ from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step as MotionStep
 from hmcs.recognition.layered import TaskRecognizer, bank_of
 from hmcs.recognition.model_file import load_model
-from hmcs_fixture_controller.translation import command_of, sample_of, state_of
+from hmcs.translation import sample_of
+from hmcs_fixture_controller.translation import command_of, state_of
 from hmcs_input_device.playback import Passes, Playback
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import read_evidence

@@ -81,6 +81,7 @@ def _of_unit_length(array: Any) -> Any:
 def _scalar(annotation: Any, metadata: list[Any]) -> Any_:
     if annotation is bytes:
         return st.binary(max_size=8)
+
     def bound(rule_type: type, name: str) -> Any:
         return next((getattr(r, name) for r in metadata if isinstance(r, rule_type)), None)
 

@@ -33,16 +33,11 @@ from hmcs.bus.session import Bus, Received
 from hmcs.fixtures.controller import Controller, Fixture, UnknownModelError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
+from hmcs.translation import guides_of, sample_of, segment_belief_of
 from hmcs_fixture_controller.driver import Driver
 from hmcs_fixture_controller.models import load_models
 from hmcs_fixture_controller.settings import FixtureControllerSettings
-from hmcs_fixture_controller.translation import (
-    belief_of,
-    command_of,
-    guides_of,
-    sample_of,
-    state_of,
-)
+from hmcs_fixture_controller.translation import command_of, state_of
 
 PAST_STEPS = 1000
 """How many steps are fetched at the start: segments that began before it need their origin."""
@@ -209,7 +204,7 @@ class FixtureController(Service):
             bus.counters.count_late(Belief.SCHEMA)
             return
         try:
-            newer = self._controller.believed(name, belief_of(belief))
+            newer = self._controller.believed(name, segment_belief_of(belief))
         except ValueError as error:
             self._refuse(Belief, str(error))
             return

@@ -235,6 +235,21 @@ class Bus:
         self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
         self.subscribes.append(key)
 
+    def listen(self, key: str, handler: Callable[[Arrival], None]) -> None:
+        """Hand everything on `key` to `handler` as it arrived, each one in order, undecoded.
+
+        For observers who keep whatever there is; what finds no place to wait is told to
+        `handler` by the gap in the numbers, as all losses are.
+        """
+        box = EveryOne(self._mailbox, handler, lambda: self._reader.overflowed(key))
+
+        def arrive(sample: zenoh.Sample) -> None:
+            now_ns = time.monotonic_ns()
+            box.arrive(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns))
+
+        self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
+        self.subscribes.append(key)
+
     # --- questions --------------------------------------------------------------------------------
 
     def answer(self, verb: str, question_type: type[Q], handler: Callable[[Q], Message]) -> None:

@@ -7,16 +7,21 @@ runs in process.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from hmcs.errors import UserError
 from hmcs.motion.steps import Step
-from hmcs.recognition.gestemes import GestemeBank, GestemeParameters, Scoring, StepEvidence
+from hmcs.recognition.gestemes import Array, GestemeBank, GestemeParameters, Scoring, StepEvidence
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.segment_filter import FilterSettings, SegmentFilter
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm
+
+Precision = Literal["float32", "float64"]
+"""Of evidence on its way from layer to layer."""
 
 
 class Layers(NamedTuple):
@@ -76,11 +81,24 @@ class TaskRecognizer:
 class LayeredRecognizer:
     """The whole layered HMM in one object: gesteme models in parallel, the task above them."""
 
-    def __init__(self, model: Model, *, anywhere: bool = False) -> None:
-        """Begin as `TaskRecognizer` does."""
+    def __init__(
+        self, model: Model, *, anywhere: bool = False, precision: Precision = "float64"
+    ) -> None:
+        """Begin as `TaskRecognizer` does; evidence is rounded to `precision` between the layers."""
         self._bank = bank_of(model)
+        self._precision = precision
         self.task = TaskRecognizer(model, anywhere=anywhere)
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
-        return self.task.step(self._bank.step(step))
+        evidence = self._bank.step(step)
+        return self.task.step(
+            evidence._replace(
+                exit=_rounded(evidence.exit, self._precision),
+                log_ratio=_rounded(evidence.log_ratio, self._precision),
+            )
+        )
+
+
+def _rounded(values: Array, precision: Precision) -> Array:
+    return values.astype(precision, copy=False).astype(np.float64, copy=False)

@@ -1,0 +1,112 @@
+"""Which part of the task each moment of a recording was: said meanwhile, or written beside it.
+
+Labels said while the hand moved are `Label` messages. Labels set afterwards stand in a CSV file
+beside the recording, `NAME.labels.csv` with the header `begin_s,end_s,state`, in seconds since the
+recording's first message; they count instead of those said. The recording is never changed.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from hmcs.bus.messages import Label, Step
+from hmcs_recorder.reading import RecordingContent, RecordingError
+
+HEADER = ["begin_s", "end_s", "state"]
+
+
+class Stretch(NamedTuple):
+    """A stretch of a recording that is one state of the task."""
+
+    begin_ns: int
+    """ns since 1970, as messages are logged."""
+    end_ns: int
+    """The first moment that is not in it."""
+    state: str
+    """A task state, or `state/gesteme`."""
+
+
+def labels_beside(recording: Path) -> Path:
+    """Return where labels of a recording are written that are set afterwards."""
+    return recording.with_name(f"{recording.stem}.labels.csv")
+
+
+def labels_of(content: RecordingContent) -> tuple[Stretch, ...]:
+    """Return the labels of a recording, in order: those beside it, else those said meanwhile.
+
+    Raises RecordingError for a file beside it that is none, naming the line.
+    """
+    beside = labels_beside(content.path)
+    if beside.is_file():
+        first_ns = content.messages[0].log_ns if content.messages else 0
+        return read_labels(beside, first_ns)
+    return _said(content)
+
+
+def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
+    """Return the labels in a file whose seconds count from `first_ns`.
+
+    Raises RecordingError, naming file and line, for a row that is none or overlaps another.
+    """
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{file}: no text that can be read: {error}") from error
+    stretches: list[Stretch] = []
+    rows = csv.reader(io.StringIO(text, newline=""))
+    if next(rows, []) != HEADER:
+        raise RecordingError(f"{file}:1: expected the header {','.join(HEADER)}")
+    for row in rows:
+        if not row:
+            continue
+        where = f"{file}:{rows.line_num}"
+        try:
+            begin_s, end_s = float(row[0]), float(row[1])
+            state = row[2].strip()
+        except (IndexError, ValueError):
+            raise RecordingError(f"{where}: expected {','.join(HEADER)}, not {row}") from None
+        if not (math.isfinite(begin_s) and math.isfinite(end_s) and begin_s < end_s and state):
+            raise RecordingError(f"{where}: expected begin_s below end_s, and a state")
+        stretch = Stretch(first_ns + round(begin_s * 1e9), first_ns + round(end_s * 1e9), state)
+        if stretches and stretch.begin_ns < stretches[-1].end_ns:
+            raise RecordingError(
+                f"{where}: begins before the label above it ends: let each end where the next one "
+                "begins, in the order of time"
+            )
+        stretches.append(stretch)
+    return tuple(stretches)
+
+
+def write_labels(file: Path, stretches: Sequence[Stretch], first_ns: int) -> None:
+    """Write labels as `read_labels` reads them, whole or not at all."""
+    unfinished = file.with_name(f".{file.name}.part")
+    with unfinished.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(HEADER)
+        for stretch in stretches:
+            begin_s, end_s = ((at - first_ns) / 1e9 for at in stretch[:2])
+            writer.writerow([f"{begin_s:.6f}", f"{end_s:.6f}", stretch.state])
+    unfinished.replace(file)
+
+
+def _said(content: RecordingContent) -> tuple[Stretch, ...]:
+    """Labels said meanwhile; one that names a step begins where that step did."""
+    began_ns: dict[tuple[str, int], int] = {}
+    for recorded, envelope, step in content.of(Step):
+        began_ns[envelope.source.boot, step.index + 1] = recorded.log_ns
+    said = [
+        (began_ns.get((label.clock, label.step), recorded.log_ns), label.state)
+        for recorded, _, label in content.of(Label)
+    ]
+    end_ns = content.messages[-1].log_ns + 1 if content.messages else 0
+    begins = [*(begin for begin, _ in said), end_ns]
+    return tuple(
+        Stretch(begin, end, state)
+        for (begin, state), end in zip(said, begins[1:], strict=True)
+        if state and begin < end
+    )
