@@ -218,6 +218,103 @@ def train(
 
 
 @app.command()
+def record(
+    name: Annotated[str, typer.Argument(help="Of the file; by date and time if none.")] = "",
+    stop: Annotated[bool, typer.Option("--stop", help="End the recording.")] = False,
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+) -> None:
+    """Let the recorder begin a recording, or end it."""
+    from hmcs.bus.messages import Record
+    from hmcs_local.asking import asked_of
+    from hmcs_local.observer import open_observer
+
+    with open_observer(router, cell) as bus:
+        typer.echo(asked_of(bus, "recorder", "record", Record(on=not stop, name=name)))
+
+
+@app.command()
+def mark(
+    state: Annotated[
+        str, typer.Argument(help="A state of the task; none ends what was marked.")
+    ] = "",
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+) -> None:
+    """Say which part of the task the hand is in from now on; the recorder writes it down."""
+    from hmcs_local.marking import mark as say
+    from hmcs_local.observer import open_observer
+
+    with open_observer(router, cell) as bus:
+        typer.echo(say(bus, state))
+
+
+@app.command()
+def inspect(
+    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,
+) -> None:
+    """Show what a recording holds, channel by channel, and what is missing.
+
+    A file that was cut off is read as far as it goes. The exit code is 0 where nothing is missing,
+    else 1.
+    """
+    from hmcs_local.recordings import show_inspection
+
+    whole = show_inspection(recording, Console(soft_wrap=True), as_json=as_json)
+    raise typer.Exit(0 if whole else 1)
+
+
+@app.command()
+def export(
+    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    to: Annotated[Path, typer.Option(metavar="DIR", help="The folder the files are written to.")],
+    form: Annotated[
+        str, typer.Option("--format", metavar="csv|npz", help="Tables, or NumPy arrays.")
+    ] = "csv",
+) -> None:
+    """Write a recording as a CSV file, or a file of NumPy arrays, for every channel."""
+    from hmcs_local.recordings import export_recording
+
+    if form not in ("csv", "npz"):
+        raise UserError(f"--format {form}: expected csv or npz")
+    export_recording(
+        recording, to, "csv" if form == "csv" else "npz", Console(highlight=False, soft_wrap=True)
+    )
+
+
+@app.command()
+def replay(
+    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Another model; by default the one kept with it."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write every step as a CSV file.")
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Through the live stack, in place of its input device.")
+    ] = False,
+    rate: Annotated[
+        float, typer.Option(metavar="R", min=0.01, max=100.0, help="So many times as fast, live.")
+    ] = 1.0,
+    task: Annotated[
+        str, typer.Option(help="Of the live input device: a shipped task's name or a task file.")
+    ] = "human-shapes",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+) -> None:
+    """Let a recorded operator move again: in process beside what was believed then, or live."""
+    from hmcs_local.recordings import replay_in_process, replay_live
+
+    if live:
+        raise typer.Exit(replay_live(recording, rate, task, router, cell))
+    replay_in_process(recording, model, out, Console(soft_wrap=True), as_json=as_json)
+
+
+@app.command()
 def recognizers(
     name: Annotated[
         str | None, typer.Argument(help="Show this one with its settings and their defaults.")

@@ -6,9 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
-from hmcs.bus.messages import ActivateRecognizer, Done, LoadModel, Message
-from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.messages import ActivateRecognizer, LoadModel, Message
+from hmcs.bus.session import Bus
 from hmcs.errors import UserError
+from hmcs_local.asking import NobodyAnswersError, asked_of
 from hmcs_local.control import Control
 
 CLASSIFIER = "gesteme_classifier"
@@ -42,23 +43,10 @@ def load(bus: Bus, path: str) -> str:
 
 
 def _asked_of_fixtures(bus: Bus, verb: str, question: Message) -> str:
-    keys = bus.keys
-    present = [keys.member_of(key) for key in bus.alive(keys.presence("fixture_controller"))]
-    if not present:
-        raise SwapError(
-            f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
-        )
-    details = []
-    for member in present:
-        key = keys.rpc(member.service, member.instance, verb)
-        try:
-            answers = bus.ask(key, question, Done)
-        except RequestRefusedError as error:
-            raise SwapError(f"{member.instance}: {error}") from None
-        if not answers:
-            raise SwapError(f"{member.instance} does not answer: see `hmcs status`")
-        details += [answer.body.detail for answer in answers]
-    return "; ".join(details)
+    try:
+        return asked_of(bus, "fixture_controller", verb, question)
+    except NobodyAnswersError as error:
+        raise SwapError(str(error)) from None
 
 
 def replace_classifier(

@@ -1,4 +1,4 @@
-"""The sources that come along: a file that is played, and two kinds of simulated operators."""
+"""The sources that come along: files that are played, simulated operators, a page's handle."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from hmcs.motion.paths import Path
 from hmcs.motion.references import References, random_gesteme, random_performance
 from hmcs.recognition.model_file import load_model
 from hmcs.task import AXES, Task
+from hmcs_input_device.held import page
+from hmcs_input_device.logged import recording
 from hmcs_input_device.playback import Passes, Playback
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
@@ -106,6 +108,8 @@ BUILT_IN: Mapping[str, SourceFactory] = {
     "recorded": recorded,
     "synthetic": synthetic,
     "simulated": simulated,
+    "recording": recording,
+    "page": page,
 }
 """Sources that need no other distribution."""
 

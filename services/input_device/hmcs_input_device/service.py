@@ -15,6 +15,7 @@ from hmcs.bus.messages import (
     Ask,
     Done,
     FixtureState,
+    Handle,
     LastSteps,
     LastStepsQuestion,
     Motion,
@@ -30,7 +31,14 @@ from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.simulated import Simulated
-from hmcs_input_device.sources import LIVE, DeviceSample, SeesRobot, Source, open_source
+from hmcs_input_device.sources import (
+    LIVE,
+    DeviceSample,
+    HearsHandle,
+    SeesRobot,
+    Source,
+    open_source,
+)
 
 _NS_PER_S = 1_000_000_000
 
@@ -72,6 +80,8 @@ class InputDevice(Service):
             self.bus.subscribe(RobotState, self.bus.keys.robot_state, self._on_robot_state)
         if self._reaction is not None:
             self.bus.subscribe(FixtureState, self.bus.keys.fixture_state, self._on_fixture_state)
+        if isinstance(self._source, HearsHandle):
+            self.bus.subscribe(Handle, self.bus.keys.handle, self._on_handle)
         self.bus.every(1.0 / self._rate_hz, self._on_tick)
 
     def health(self) -> tuple[bool, str]:
@@ -108,6 +118,8 @@ class InputDevice(Service):
         now_ns = time.monotonic_ns()
         elapsed_s = self._elapsed_s(now_ns)
         released = self._reaction is not None and self._reaction.released
+        if isinstance(self._source, HearsHandle):
+            self._source.seconds(now_ns / _NS_PER_S)
         sample = self._source.sample(elapsed_s)
         if self._reaction is not None and self._reaction.released != released:
             self.log.info("presses again" if released else "lets go, as the robot stands")
@@ -166,6 +178,13 @@ class InputDevice(Service):
         heard_s = self._elapsed_s(received.received_ns)
         if self._reaction is not None and heard_s is not None:
             self._reaction.robot_told(heard_s, follows=received.body.stop == "none")
+
+    def _on_handle(self, received: Received[Handle]) -> None:
+        assert isinstance(self._source, HearsHandle)
+        if not self._source.handled(received.received_ns / _NS_PER_S, received.body):
+            reason = f"{received.body.operator} does not operate: another page holds the handle"
+            self.bus.counters.count_refused(Handle.SCHEMA, reason)
+            self._seldom.warning("handle", "handle refused", reason=reason)
 
     def _on_fixture_state(self, received: Received[FixtureState]) -> None:
         if self._reaction is not None:

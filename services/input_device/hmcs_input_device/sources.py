@@ -20,6 +20,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.bus.messages import Handle
 from hmcs.errors import UserError
 from hmcs.task import Task
 from hmcs_input_device.settings import InputDeviceSettings
@@ -81,6 +82,17 @@ class SeesRobot(Protocol):
 
     def sees(self, position: FloatArray, orientation: FloatArray) -> None:
         """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
+
+
+@runtime_checkable
+class HearsHandle(Protocol):
+    """A source that is the handle of a page."""
+
+    def handled(self, now_s: float, handle: Handle) -> bool:
+        """Take in what a page says; False where another operator's page holds the lease."""
+
+    def seconds(self, now_s: float) -> None:
+        """Be told the time of the next sample, by the clock of `handled`."""
 
 
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]

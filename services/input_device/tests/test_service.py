@@ -137,7 +137,7 @@ def test_a_dead_zone_larger_than_the_motion_makes_a_simulated_device_unhealthy(
         (["--dead-zone-m", "0.2", "--demonstration", "SMALL"], "less than the dead zone of 0.2 m"),
         (["--demonstration", "none.csv"], "none.csv: cannot be read"),
         (["--task", "none"], "human-shapes, lines-through-obstacles"),
-        (["--source", "mouse"], "choose of: recorded, simulated, synthetic"),
+        (["--source", "mouse"], "choose of: page, recorded, recording, simulated, synthetic"),
         (["--rate-hz", "7"], "rate_hz"),
     ],
 )

@@ -178,5 +178,7 @@ def test_another_distribution_can_add_a_device() -> None:
 def test_a_device_that_cannot_be_loaded_or_is_not_there_is_a_users_mistake() -> None:
     with pytest.raises(UserError, match=r"fake_arm:nothing.*cannot be loaded"):
         opened(source="broken")
-    with pytest.raises(UserError, match="choose of: arm, broken, recorded, simulated, synthetic"):
+    with pytest.raises(
+        UserError, match="choose of: arm, broken, page, recorded, recording, simulated, synthetic"
+    ):
         opened(source="joystick")

@@ -20,8 +20,8 @@ from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Ask, Description, Done, Record, SettingsReport
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
-from hmcs_recorder.parts import Limits, Preface, Recording, as_fields
-from hmcs_recorder.plain import Fields, fields_of
+from hmcs.recordings.parts import Limits, Preface, Recording, as_fields
+from hmcs.recordings.plain import Fields, fields_of
 from hmcs_recorder.settings import RecorderSettings
 
 LOST = "recording"
@@ -144,7 +144,7 @@ class Recorder(Service):
             except OSError as error:
                 self._interrupted(error)
         elif self._wanted and time.monotonic() >= self._again_s:
-            self._open(f"{self._wanted}-{_now():%H%M%S}")
+            self._open(f"{self._wanted}-{_now():%H%M%S%f}")
 
     def _interrupted(self, error: OSError) -> None:
         if self._recording is not None:

@@ -1,4 +1,4 @@
-"""Demonstrations by reference: a CSV file's path, or `lasa:SHAPE/NUMBER`."""
+"""Demonstrations by reference: the path of a CSV file or a recording, or `lasa:SHAPE/NUMBER`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import re
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
 from hmcs.motion.lasa import read_drawing
+from hmcs.recordings.demonstrations import demonstrations_of
+from hmcs.recordings.parts import SUFFIX as RECORDING
+from hmcs.recordings.reading import read
 from hmcs.task import Task
 
 _DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
@@ -14,13 +17,16 @@ _DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?"
 def read_references(references: list[str], task: Task) -> list[Demonstration]:
     """Return the demonstrations of a task that the references name.
 
-    `lasa:SHAPE/FIRST-LAST` names several drawings. Raises DemonstrationError for a reference that
-    names none.
+    `lasa:SHAPE/FIRST-LAST` names several drawings, a recording may hold several. Raises
+    DemonstrationError for a reference that names none, RecordingError for a recording that cannot
+    be used.
     """
     return [demonstration for item in references for demonstration in _read(item, task)]
 
 
 def _read(reference: str, task: Task) -> list[Demonstration]:
+    if reference.endswith(RECORDING):
+        return demonstrations_of(read(reference))
     if not reference.startswith("lasa:"):
         return [read_csv(reference)]
     match = _DRAWING.fullmatch(reference)

@@ -10,8 +10,8 @@ import numpy as np
 
 from hmcs.bus.messages import Motion
 from hmcs.motion.demonstrations import Demonstration
-from hmcs_recorder.labels import labels_of
-from hmcs_recorder.reading import RecordingContent
+from hmcs.recordings.labels import labels_of
+from hmcs.recordings.reading import RecordingContent
 
 LEAST_SAMPLES = 2
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from hmcs.bus.counters import Sequences
-from hmcs_recorder.reading import RecordingContent
+from hmcs.recordings.reading import RecordingContent
 
 
 class ChannelSummary(NamedTuple):

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.bus.messages import Motion
-from hmcs_recorder.exporting import export
-from hmcs_recorder.inspection import inspected
-from hmcs_recorder.reading import read
+from hmcs.recordings.exporting import export
+from hmcs.recordings.inspection import inspected
+from hmcs.recordings.reading import read
 from support.recordings import KEYS, Maker, Said
 
 

@@ -19,7 +19,7 @@ from hmcs.bus.messages import Envelope
 from hmcs.bus.messages import Message as BusMessage
 from hmcs.bus.wire import schema_of
 from hmcs.errors import UserError
-from hmcs_recorder.plain import NoMessageError, message_of
+from hmcs.recordings.plain import NoMessageError, message_of
 
 M = TypeVar("M", bound=BusMessage)
 

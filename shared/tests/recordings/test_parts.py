@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from hmcs.errors import UserError
-from hmcs_recorder.parts import NoRoomError
-from hmcs_recorder.reading import read
+from hmcs.recordings.parts import NoRoomError
+from hmcs.recordings.reading import read
 from support.recordings import BEGUN_NS, KEYS, PERIOD_NS, ROOMY, Maker, Said
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hmcs.bus.examples import ENVELOPE, EXAMPLES
 from hmcs.bus.messages import Message, Motion
 from hmcs.bus.wire import encode, schema_of
-from hmcs_recorder.plain import NoMessageError, fields_of, json_schema_of, message_of
+from hmcs.recordings.plain import NoMessageError, fields_of, json_schema_of, message_of
 
 PUBLISHED = [body for body in EXAMPLES if type(body).__name__ != "RobotLooks"]
 

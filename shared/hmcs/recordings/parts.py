@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hmcs.errors import UserError
-from hmcs_recorder.plain import Fields
-from hmcs_recorder.well_known import Showing
-from hmcs_recorder.writing import RecordingFile
+from hmcs.recordings.plain import Fields
+from hmcs.recordings.well_known import Showing
+from hmcs.recordings.writing import RecordingFile
 
 SUFFIX = ".mcap"
 _NS_PER_S = 1_000_000_000

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hmcs_recorder.reading import Recorded, RecordingContent
+from hmcs.recordings.reading import Recorded, RecordingContent
 
 Format = Literal["csv", "npz"]
 _ENVELOPE = ("schema",)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hmcs.bus.messages import Motion
-from hmcs_recorder.demonstrations import demonstrations_of
-from hmcs_recorder.labels import labels_beside, labels_of, write_labels
-from hmcs_recorder.reading import RecordingError, read
+from hmcs.recordings.demonstrations import demonstrations_of
+from hmcs.recordings.labels import labels_beside, labels_of, write_labels
+from hmcs.recordings.reading import RecordingError, read
 from support.recordings import Maker, Said
 
 

@@ -13,8 +13,8 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from hmcs.bus.messages import Motion, Step
-from hmcs_recorder.inspection import inspected
-from hmcs_recorder.reading import RecordingError, read
+from hmcs.recordings.inspection import inspected
+from hmcs.recordings.reading import RecordingError, read
 from support.recordings import KEYS, Maker, Said
 
 CUTS = 1000

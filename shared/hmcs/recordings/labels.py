@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hmcs.bus.messages import Label, Step
-from hmcs_recorder.reading import RecordingContent, RecordingError
+from hmcs.recordings.reading import RecordingContent, RecordingError
 
 HEADER = ["begin_s", "end_s", "state"]
 

@@ -9,8 +9,8 @@ from typing import IO, Any, cast
 
 from mcap.writer import CompressionType, Writer
 
-from hmcs_recorder.plain import BY_SCHEMA, json_schema_of
-from hmcs_recorder.well_known import SCHEMAS
+from hmcs.recordings.plain import BY_SCHEMA, json_schema_of
+from hmcs.recordings.well_known import SCHEMAS
 
 PROFILE = "hmcs"
 CHUNK_BYTES = 256 * 1024

@@ -18,9 +18,9 @@ from hmcs.recognition.model_file import load_model
 from hmcs.recognition.recognizer import Guarded, Recognizer
 from hmcs.recognition.recognizers import recognizer_of
 from hmcs.recognition.scoring import changes
+from hmcs.recordings.labels import labels_of
+from hmcs.recordings.reading import RecordingContent, RecordingError
 from hmcs.translation import belief_message, step_of
-from hmcs_recorder.labels import labels_of
-from hmcs_recorder.reading import RecordingContent, RecordingError
 
 COMPARED = ("probabilities", "unknown", "log_likelihood", "mean_log_likelihood", "segment_start")
 """What makes two beliefs the same, bit by bit."""

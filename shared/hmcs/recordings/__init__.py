@@ -1,0 +1,1 @@
+"""Recordings of a cell: MCAP files, written, read, labeled, exported and replayed."""
