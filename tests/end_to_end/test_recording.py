@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Motion
+from hmcs.bus.messages import Ask, Health, Motion
 from hmcs.motion.steps import Step
 from hmcs.recordings.inspection import inspected
 from hmcs.recordings.reading import RecordingContent, read
@@ -21,6 +21,17 @@ def recorded(scene: Scene, folder: Path) -> RecordingContent:
     assert process.stop() == 0
     (file,) = folder.glob("*.mcap")
     return read(file)
+
+
+def until_recorded(scene: Scene, schema: str, count: int) -> None:
+    """Wait until the recorder has got so many messages."""
+    key = scene.bus.keys.rpc("recorder", "rec", "health")
+
+    def received() -> int:
+        answers = scene.bus.ask(key, Ask(), Health)
+        return answers[0].body.received.get(schema, 0) if answers else 0
+
+    scene.stack.until(lambda: received() >= count)
 
 
 @pytest.fixture
@@ -44,6 +55,8 @@ def test_a_replay_with_the_same_model_believes_the_very_same(
         "recorder", "rec", "--folder", recordings, "--models", f'["{model_file}"]', "--free-mb", "0"
     )
     scene.in_step(steps[:300])
+    until_recorded(scene, "belief", 300)
+    until_recorded(scene, "step", 300)
     content = recorded(scene, recordings)
     assert inspected(content).problems == ()
     comparison = compared(replayed(content, kept_model(content)))
