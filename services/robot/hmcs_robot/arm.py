@@ -42,6 +42,7 @@ class Arm:
         turning = [info for info in movable if info[2] == pybullet.JOINT_REVOLUTE]
         self.joints: list[int] = [info[0] for info in turning]
         self.other_joints: list[int] = [info[0] for info in movable if info not in turning]
+        self.joint_names = tuple(info[1].decode() for info in turning)
         self.torques: list[float] = [info[10] for info in turning]
         speeds = model.joint_speed_rad_s or [info[11] for info in turning]
         self.limits = JointLimits(

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs_robot.looks import Looks
+
 Array = NDArray[np.float64]
 
 
@@ -88,6 +90,10 @@ class ArmDriver(Protocol):
 
     def move(self, joint_velocities: Array) -> None:
         """Follow `joint_velocities`, rad/s, shape (n,), for one control period."""
+        ...
+
+    def looks(self) -> Looks:
+        """Return what is needed to draw it."""
         ...
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from hmcs.bus.messages import Command, Origin, RobotState
+from hmcs.bus.messages import Ask, Command, Origin, RobotLooks, RobotState
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.task import load_task
@@ -58,6 +58,7 @@ class Robot(Service):
     def start(self) -> None:
         """Listen and begin to move."""
         self._done_ns = time.monotonic_ns()
+        self.bus.answer("looks", Ask, self._looks)
         self.bus.subscribe(Command, self.bus.keys.command, self._on_command)
         self.bus.every(self._period_ns / _NS_PER_S, self._on_tick)
 
@@ -78,6 +79,9 @@ class Robot(Service):
     def close(self) -> None:
         """Let go of the arm."""
         self._driver.close()
+
+    def _looks(self, _: Ask) -> RobotLooks:
+        return RobotLooks(robot=self._driver.name, **self._driver.looks()._asdict())
 
     def _on_command(self, received: Received[Command]) -> None:
         command = received.body

@@ -13,6 +13,7 @@ from hmcs.task import Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm
 from hmcs_robot.driver import ArmState, Array, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
+from hmcs_robot.looks import Looks, looks_of
 from hmcs_robot.robots import ROBOTS
 
 _GRAVITY_M_S2 = 9.81
@@ -120,6 +121,10 @@ class Simulation:
             physicsClientId=self._client,
         )
         pybullet.stepSimulation(physicsClientId=self._client)
+
+    def looks(self) -> Looks:
+        """Return what is needed to draw the arm."""
+        return looks_of(ROBOTS[self.name].urdf, self.arm.joint_names)
 
     def close(self) -> None:
         """End the simulation."""
