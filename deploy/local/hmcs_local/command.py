@@ -173,7 +173,10 @@ def router(
 def train(
     task: Annotated[str, typer.Argument(help="A shipped task's name or a task file.")],
     demonstrations: Annotated[
-        list[str], typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER, lasa:SHAPE/FIRST-LAST.")
+        list[str],
+        typer.Argument(
+            help="CSV files, MCAP recordings, lasa:SHAPE/NUMBER, lasa:SHAPE/FIRST-LAST."
+        ),
     ],
     output: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
     name: Annotated[
@@ -195,8 +198,15 @@ def train(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of what is drawn at random in learning.")] = 0,
+    report: Annotated[
+        bool, typer.Option(help="Write a page beside the model on what it is worth.")
+    ] = True,
 ) -> None:
-    """Learn a model of a task from demonstrations."""
+    """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
+
+    The page tells how each demonstration is recognized by a model of the others, which states are
+    taken for each other, how far demonstrations lay apart, and what would help.
+    """
     from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
 
@@ -211,6 +221,7 @@ def train(
             settings=dict(map(_setting, settings or [])),
             choices=alternatives,
             seed=seed,
+            report=output.with_suffix(".html") if report else None,
             progress=typer.echo,
             fits=fits,
         )

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 
 from hmcs.errors import UserError
+from hmcs.recognition.recognizers import DEFAULT
 from hmcs.task import load_task
 from hmcs_trainer.performance import perform
 from hmcs_trainer.training import train
+
+
+def tell(line: str) -> None:
+    """Tell what is done, for the process that started this one."""
+    print(json.dumps({"detail": line}), flush=True)
+
+
+def tell_fits(done: int, count: int) -> None:
+    """Tell how many of all fits are done."""
+    print(json.dumps({"done": done, "count": count}), flush=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -28,6 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--ring", action="store_true", help="bend the performance to end where it began"
     )
+    parser.add_argument("--recognizer", default=DEFAULT, help="the kind to learn for")
+    parser.add_argument("--report", help="the page to write on what the model is worth")
+    parser.add_argument(
+        "--tell", action="store_true", help="tell what is done on stdout, a line of JSON each"
+    )
     given = parser.parse_args(argv)
     if bool(given.performance) != bool(given.performance_output):
         parser.error("--performance and --performance-output go together")
@@ -37,7 +54,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             given.demonstrations,
             given.output,
             name=given.name,
-            progress=lambda line: print(line, file=sys.stderr),
+            recognizer=given.recognizer,
+            report=given.report,
+            progress=tell if given.tell else lambda line: print(line, file=sys.stderr),
+            fits=tell_fits if given.tell else lambda _done, _all: None,
         )
         if given.performance:
             perform(

@@ -8,15 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.bus.keys import check_name
-from hmcs.recognition.disagreement import check_agreement
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.recognizers import DEFAULT, kind_named, settings_of
-from hmcs.recognition.segments import segments_of
+from hmcs.recognition.segments import LearningError
 from hmcs.recognition.selection import choose
 from hmcs.task import load_task
+from hmcs_trainer.advice import advice
+from hmcs_trainer.judging import judged
 from hmcs_trainer.references import read_references
+from hmcs_trainer.report import numbers, write_report
+from hmcs_trainer.validation import findings
 
 
 def train(
@@ -29,6 +32,7 @@ def train(
     settings: Mapping[str, str] | None = None,
     choices: Mapping[str, Sequence[str]] | None = None,
     seed: int = 0,
+    report: str | Path | None = None,
     progress: Callable[[str], None] = lambda _: None,
     fits: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Model:
@@ -36,7 +40,9 @@ def train(
 
     The model is called `name`, or as the task is. `recognizer` is the kind to learn for, with
     `settings` of its own as text; of `choices` the best by held-out likelihood is taken, `fits` is
-    told how many of all fits are done. What is random is drawn with `seed`. Raises a UserError that
+    told how many of all fits are done. With `report` a page is written that tells what the model is
+    worth: each demonstration, or eight of many, is recognized by a model of the others. What is
+    random is drawn with `seed`. Raises a UserError that
     says what is wrong with the task, a reference, a demonstration, the name, the recognizer or a
     setting.
     """
@@ -45,7 +51,13 @@ def train(
         check_name("model", name)
     progress("reading demonstrations")
     demonstrations = read_references(references, loaded)
-    check_agreement(loaded, segments_of(loaded, demonstrations))
+    found = findings(loaded, demonstrations)
+    for finding in found:
+        if not finding.serious:
+            progress(finding.text)
+    serious = [finding.text for finding in found if finding.serious]
+    if serious:
+        raise LearningError("; ".join(serious))
     if choices:
         selection = choose(
             loaded,
@@ -56,9 +68,9 @@ def train(
             seed=seed,
             progress=fits,
         )
-        for judged in selection.judged:
-            values = " ".join(f"{name}={value}" for name, value in judged.chosen.items())
-            progress(f"{judged.log_probability:+.4f} ± {judged.spread:.4f} nats a step: {values}")
+        for tried in selection.judged:
+            values = " ".join(f"{name}={value}" for name, value in tried.chosen.items())
+            progress(f"{tried.log_probability:+.4f} ± {tried.spread:.4f} nats a step: {values}")
         chosen = selection.settings
     else:
         chosen = settings_of(kind_named(recognizer), settings or {})
@@ -70,4 +82,10 @@ def train(
         rng=np.random.default_rng(seed),
         progress=progress,
     )
-    return save_model(model._replace(name=name or model.name), output)
+    saved = save_model(model._replace(name=name or model.name), output)
+    if report is not None:
+        progress("judging")
+        left_out = judged(loaded, demonstrations, chosen, recognizer, fits)
+        write_report(Path(report), saved, left_out, advice(saved, left_out), found)
+        progress(numbers(left_out))
+    return saved

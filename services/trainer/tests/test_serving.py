@@ -1,0 +1,82 @@
+"""The trainer on the bus: trains when asked, in a process of its own."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hmcs.bus.messages import Ask, Train, TrainingProgress
+from hmcs.bus.session import RequestRefusedError
+from hmcs.recognition.model_file import load_model
+from hmcs_trainer.serving import Trainer, TrainerSettings
+from support.stack import Stack
+
+DRAWINGS = tuple(f"lasa:{s}/1-2" for s in ("GShape", "NShape", "PShape", "JShape", "Snake"))
+ASKED = Train(model="mine", task="human-shapes", demonstrations=DRAWINGS)
+
+
+class Bench:
+    """A trainer and somebody who watches, both in this thread."""
+
+    def __init__(self, stack: Stack, folder: Path) -> None:
+        self.stack, self.folder = stack, folder
+        self.told: list[TrainingProgress] = []
+        watcher = stack.open_bus("observer", "one")
+        watcher.subscribe(
+            TrainingProgress, watcher.keys.training, lambda got: self.told.append(got.body)
+        )
+        bus = stack.open_bus("trainer", "here")
+        self.trainer = Trainer(TrainerSettings(folder=folder), bus, logging.getLogger("test"))
+        self.trainer.start()
+
+    def until(self, stage: str) -> TrainingProgress:
+        def reached() -> TrainingProgress | None:
+            return next((told for told in self.told if told.stage == stage), None)
+
+        found = self.stack.until(reached, within_s=120.0)
+        assert isinstance(found, TrainingProgress)
+        return found
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with Stack(tmp_path) as stack:
+        made = Bench(stack, tmp_path / "models")
+        yield made
+        made.trainer.close()
+
+
+def test_a_model_and_its_page_are_made_and_progress_is_told(bench: Bench) -> None:
+    assert "training mine" in bench.trainer._train(ASKED).detail
+    with pytest.raises(RequestRefusedError, match="mine is being trained: wait"):
+        bench.trainer._train(ASKED)
+    done = bench.until("done")
+    assert load_model(done.path).name == "mine"
+    assert Path(done.report).is_file()
+    shares = [told.share for told in bench.told]
+    assert shares == sorted(shares)
+    assert {"checking", "learning", "judging", "done"} == {told.stage for told in bench.told}
+    assert "steps right" in done.detail
+    assert "mine" in bench.trainer.health()[1]
+
+
+def test_a_training_that_cannot_succeed_says_why_and_the_next_one_may(bench: Bench) -> None:
+    bench.trainer._train(ASKED.model_copy(update={"demonstrations": ("none.csv",)}))
+    failed = bench.until("failed")
+    assert "none.csv" in failed.detail
+    assert list(bench.folder.iterdir()) == []
+    bench.trainer._train(ASKED)
+    bench.until("learning")
+
+
+def test_a_training_is_canceled_without_a_trace(bench: Bench) -> None:
+    with pytest.raises(RequestRefusedError, match="nothing is being trained"):
+        bench.trainer._cancel(Ask())
+    bench.trainer._train(ASKED)
+    bench.until("learning")
+    assert "canceled mine" in bench.trainer._cancel(Ask()).detail
+    bench.until("canceled")
+    assert list(bench.folder.iterdir()) == []
