@@ -153,6 +153,41 @@ def swap(
 
 
 @app.command()
+def deploy(
+    model: Annotated[
+        Path | None, typer.Argument(help="The model file whose recognizer is to take over.")
+    ] = None,
+    back: Annotated[
+        bool, typer.Option("--back", help="Return to the model that was active before.")
+    ] = False,
+    watch_s: Annotated[
+        float,
+        typer.Option("--watch-s", min=0.0, metavar="S", help="So long it is compared as a shadow."),
+    ] = 5.0,
+    router: _Router = DEFAULT_ROUTER,
+    cell: _Cell = "demo",
+    folder: _Folder = DEFAULT_FOLDER,
+) -> None:
+    """Let a newly trained model take over while the operator moves, or return to the one before.
+
+    Its recognizer comes up as a shadow of the active one, replays the last steps, is compared with
+    it for a while, and is activated; the old one leaves then. All of it belongs to the `hmcs up` of
+    --folder.
+    """
+    from hmcs_local import deploying
+    from hmcs_local.control import Control
+    from hmcs_local.observer import open_observer
+
+    if (model is None) != back:
+        raise UserError("name either a model file or --back")
+    with open_observer(router, cell) as bus:
+        if model is None:
+            typer.echo(f"back to {deploying.back(bus, Control(folder), folder, typer.echo)}")
+        else:
+            deploying.deploy(bus, Control(folder), folder, model, watch_s=watch_s, tell=typer.echo)
+
+
+@app.command()
 def router(
     listen: Annotated[
         str, typer.Option(metavar="ENDPOINT", help="Where it listens.")
