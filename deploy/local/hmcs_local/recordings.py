@@ -87,6 +87,11 @@ def replay_in_process(
         console.print(json.dumps(told), soft_wrap=True, highlight=False)
     else:
         _show(comparison, chosen, replay.compared_with, console)
+        if replay.first_step:
+            console.print(
+                f"it begins with step {replay.first_step}: what was known from the steps before "
+                "is not in it, so that beliefs may differ"
+            )
     return comparison
 
 

@@ -17,15 +17,26 @@ from hmcs.bus.counters import Sequences
 from hmcs.bus.keys import ANY, check_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.mailbox import Arrival
-from hmcs.bus.messages import Ask, Description, Done, Record, SettingsReport
+from hmcs.bus.messages import (
+    Ask,
+    Description,
+    Done,
+    Envelope,
+    LastSteps,
+    LastStepsQuestion,
+    Record,
+    SettingsReport,
+)
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.wire import encode
 from hmcs.recordings.parts import Limits, Preface, Recording, as_fields
 from hmcs.recordings.plain import Fields, fields_of
 from hmcs_recorder.settings import RecorderSettings
 
 LOST = "recording"
 """What is counted as lost while nothing can be written."""
+MOST_PAST_STEPS = 10_000
 RETRY_S = 5.0
 """After so long without room it is tried again."""
 LARGEST_CLOCK_DIFFERENCE_NS = 5_000_000_000
@@ -53,9 +64,9 @@ class Recorder(Service):
     def start(self) -> None:
         """Listen, and record unless told to wait."""
         self.bus.answer("record", Record, self._asked)
+        self.bus.listen(self.bus.keys.everything, self._on_arrival)
         if self.settings.autostart:
             self._begin("")
-        self.bus.listen(self.bus.keys.everything, self._on_arrival)
         self.bus.every(self.settings.flush_s, self._on_flush)
 
     def health(self) -> tuple[bool, str]:
@@ -172,7 +183,22 @@ class Recorder(Service):
             return None
         self._trouble = ""
         self.log.info("recording", extra={"file": str(self._recording.path)})
+        self._write_past_steps(self._recording)
         return self._recording
+
+    def _write_past_steps(self, recording: Recording) -> None:
+        """Begin with the steps made before: recognizers know them, and so must a replay."""
+        bus = self.bus
+        key = bus.keys.rpc("input_device", ANY, "last_steps")
+        question = LastStepsQuestion(count=MOST_PAST_STEPS)
+        for answer in bus.ask(key, question, LastSteps, ASK_S)[:1]:
+            now_ns = time.monotonic_ns() + self._wall_minus_monotonic_ns
+            for step, origin in zip(answer.body.steps, answer.body.origins, strict=False):
+                # A device numbers its steps as it numbers their messages.
+                envelope = Envelope(source=answer.envelope.source, seq=step.index, origin=origin)
+                fields = fields_of(encode(step, envelope))
+                captured_ns = self._captured_ns(fields, now_ns)
+                recording.write(bus.keys.step, fields, now_ns, captured_ns)
 
     def _end(self) -> None:
         recording, self._recording, self._wanted, self._trouble = self._recording, None, "", ""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Ask, Health, Motion, Record
-from hmcs.bus.session import RequestRefusedError
+from hmcs.bus.messages import Ask, Health, Motion, Record, Step
+from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.motion.steps import DeadZone
 from hmcs.recordings.inspection import inspected
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs_recorder.service import Recorder
@@ -176,3 +179,28 @@ def test_a_recorder_says_where_it_records(stack: Stack, tmp_path: Path) -> None:
     facts = bench.service.facts()
     assert facts["recording"].endswith(".mcap")
     assert facts["folder"] == str(tmp_path / "recordings")
+
+
+def test_steps_made_before_it_began_are_in_a_recording(stack: Stack, tmp_path: Path) -> None:
+    early = Hand(stack.open_bus("input_device", "early"))
+    zone = DeadZone(0.01)
+    made = [step for k in range(30) if (step := zone.push([0.01 * k, 0.0, 0.0])) is not None]
+    for step in made[:20]:
+        early.keep(step)
+    with ThreadPoolExecutor(1) as aside:
+        over = Event()
+        answering = aside.submit(_pump_until, early.bus, over)
+        bench = Bench(stack, tmp_path / "recordings")
+        over.set()
+        answering.result()
+    for step in made[20:]:
+        early.step(step)
+    stack.until(lambda: bench.bus.counters.received[Step.SCHEMA] >= len(made) - 20)
+    bench.service.close()
+    steps = [step.index for _, _, step in bench.content().of(Step)]
+    assert steps == [step.index for step in made]
+
+
+def _pump_until(bus: Bus, over: Event) -> None:
+    while not over.is_set():
+        bus.pump(0.01)

@@ -50,6 +50,8 @@ class Replay(NamedTuple):
     """Processor time."""
     lasted_s: float
     """From the first to the last step, as recorded."""
+    first_step: int
+    """Of the recording; what a recognizer knew of those before it is not in it."""
 
 
 class Comparison(NamedTuple):
@@ -110,6 +112,9 @@ def replayed(
     clock, recognizer, expected, label = "", None, -1, 0
     began_s = time.process_time()
     for number, (logged, envelope, step) in enumerate(steps):
+        if envelope.source.boot == clock and step.index < expected:
+            # It stands there twice: among the steps made before, and as it came.
+            continue
         if recognizer is None or envelope.source.boot != clock or step.index != expected:
             clock = envelope.source.boot
             recognizer = _recognizer(model, step.index > 0, precision)
@@ -131,7 +136,7 @@ def replayed(
         progress((number + 1) / len(steps))
     spent_s = time.process_time() - began_s
     lasted_s = (steps[-1][0].log_ns - steps[0][0].log_ns) / 1e9
-    return Replay(model, name, tuple(beliefs), spent_s, lasted_s)
+    return Replay(model, name, tuple(beliefs), spent_s, lasted_s, steps[0][2].index)
 
 
 def compared(replay: Replay) -> Comparison:
