@@ -14,7 +14,7 @@ from hmcs_laboratory.figures.run import FINDINGS, PAGE, make, make_figures, writ
 NUMBERS = [
     *("2.5", "2.6", "2.7", "2.8", "2.9", "2.10", *(f"2.{number}" for number in range(12, 18))),
     *("3.2", "3.3", "3.4", "3.6", "3.7", "3.8", "3.9", "3.10"),
-    *(f"4.{number}" for number in (*range(2, 14), 16, 17)),
+    *(f"4.{number}" for number in (*range(2, 14), 15, 16, 17)),
     *("B.1", "B.2", "B.3"),
 ]
 RECORDED = {

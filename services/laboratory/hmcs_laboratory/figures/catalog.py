@@ -404,6 +404,9 @@ FIGURES: tuple[Figure[Any], ...] = (
         trajectories_of_force_tasks,
         ForceTaskSettings(),
         {"robot": "lag"},
+        stand_in="The thesis had an arm of PowerCubes led by a person at a force sensor. Here a "
+        "simulated operator pushes the tool of a simulated PUMA 560 through a force sensor, from "
+        "which gravity is removed, and an admittance.",
     ),
     Figure(
         "4.16",

@@ -56,10 +56,8 @@ def trajectories_of_force_tasks(settings: ForceTaskSettings, rng: np.random.Gene
         {"accuracy": right, "touched": [", ".join(sorted(r.touched)) for r in (run, led)]},
         f"Dots are changes of state. {100 * right[0]:.0f} % of the steps of the first and "
         f"{100 * right[1]:.0f} % of the second were recognized while they were made.",
-        "The thesis had an arm of PowerCubes led by a person at a force sensor. Here a simulated "
-        "operator pushes the tool of a simulated PUMA 560 through a force sensor, from which "
-        "gravity is removed, and an admittance; order, gestemes and number of demonstrations are "
-        "those of the thesis.",
+        "Order, gestemes, symbols and number of demonstrations are those of the thesis; how large "
+        "its trajectories were it does not say.",
     )
 
 

@@ -46,6 +46,7 @@ class ObjectSettings(ForceTaskSettings):
     """Who leads the robot around the object."""
 
     symbols: Count = 25
+    """Of chapter 4's recognizer; as in the thesis 25 in space."""
 
 
 SURFACE = {
