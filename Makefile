@@ -36,8 +36,9 @@ bench: $(READY) ## measure speed and recognition in full, each against its goal;
 peers: $(READY) ## install the libraries that studies compare with, beside the rest
 	@$(UV) sync --frozen --quiet --group peers --python $(RUN)/python
 
-schemas: $(READY) ## rewrite the JSON Schemas and golden bytes of all messages
+schemas: $(READY) ## rewrite JSON Schemas, golden bytes and the page of all messages
 	@$(RUN)/python -m hmcs.bus.schemas tests/contract
+	@$(RUN)/python -m hmcs.bus.contract_page docs/contract.md
 
 test-containers: $(READY) ## build the images and run the stack in a Docker engine
 	@$(RUN)/python -m pytest -m containers tests/containers

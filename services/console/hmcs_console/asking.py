@@ -1,0 +1,78 @@
+"""Questions to other processes, asked on threads of their own: an answer may take its time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from hmcs.bus.keys import Member
+from hmcs.bus.messages import Done, Message
+from hmcs.bus.session import Answer, Bus, RequestRefusedError, StoppedError
+
+M = TypeVar("M", bound=Message)
+
+_AT_ONCE = 2
+
+
+class Asking:
+    """Asks, and keeps what comes of it until `take` is called on the bus' own thread."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._pool = ThreadPoolExecutor(_AT_ONCE, thread_name_prefix="asking")
+        self._come: deque[Callable[[], None]] = deque()
+
+    def ask(
+        self,
+        key: str,
+        question: Message,
+        answer_type: type[M],
+        then: Callable[[list[Answer[M]]], None],
+        refused: Callable[[str], None] = lambda _: None,
+        timeout_s: float = 1.0,
+    ) -> None:
+        """Ask whoever answers on `key`; hand the answers, or the refusal, on with `take`."""
+
+        def work() -> None:
+            try:
+                answers = self._bus.ask(key, question, answer_type, timeout_s)
+            except RequestRefusedError as error:
+                reason = str(error)
+                self._come.append(lambda: refused(reason))
+            except StoppedError:
+                pass
+            else:
+                self._come.append(lambda: then(answers))
+
+        self._pool.submit(work)
+
+    def request(
+        self, member: Member, verb: str, question: Message, told: Callable[[str], None]
+    ) -> None:
+        """Ask one process to do something; tell in one line what came of it."""
+        key = self._bus.keys.rpc(member.service, member.instance, verb)
+        silent = f"{member.service} gave no answer to {verb}"
+        self.ask(
+            key,
+            question,
+            Done,
+            lambda answers: told(answers[0].body.detail if answers else silent),
+            lambda reason: told(f"{member.service} refused: {reason}"),
+            timeout_s=5.0,
+        )
+
+    def take(self) -> None:
+        """Hand on what has come."""
+        while self._come:
+            self._come.popleft()()
+
+    def close(self) -> None:
+        """Wait for what is being asked; ask nothing more."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def first_of(service: str, members: Iterable[Member]) -> Member | None:
+    """Return the first process of a kind by name; None where there is none."""
+    return min((member for member in members if member.service == service), default=None)

@@ -1,0 +1,61 @@
+"""The whole page: server, scene, and panel, drawn from pictures."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import numpy as np
+
+from hmcs.task import Task
+from hmcs_console.models import Guides
+from hmcs_console.page import Page
+from hmcs_console.panel import Panel, Wishes
+from hmcs_console.scene import Scene
+from hmcs_console.seen import Picture
+from hmcs_console.surroundings import draw_ground, draw_workspace
+
+WORDS_EVERY_S = 0.2
+"""How often words and plots are drawn: nobody reads faster."""
+_HANDLE_AT_M = (0.5, 0.0, 0.4)
+
+
+class View:
+    """Draws pictures onto the page; `draw` is called on one thread."""
+
+    def __init__(
+        self,
+        guides: Guides,
+        task: Task | None,
+        wishes: Wishes,
+        lease_s: float,
+        log: logging.Logger,
+    ) -> None:
+        start_m = _HANDLE_AT_M if task is None else task.robot.tool_start_m
+        self.page = Page(np.array(start_m), lease_s)
+        server = self.page.server
+        states = () if task is None else tuple(state.name for state in task.states)
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        x, y, z = start_m
+        server.initial_camera.position = (x + 0.6, y - 0.8, z + 0.5)
+        server.initial_camera.look_at = (x, y, z)
+        draw_ground(server.scene)
+        if task is not None:
+            draw_workspace(server.scene, task.workspace)
+        self._scene = Scene(server, guides, log)
+        self._panel = Panel(server.gui, wishes, states, "" if task is None else task.name)
+        self._words_s = 0.0
+        self.page.serve(self._panel.operating)
+
+    def draw(self, picture: Picture) -> None:
+        """Draw a moment."""
+        server = self.page.server
+        with server.atomic():
+            self._scene.draw(picture)
+        if picture.robot is not None:
+            self.page.lead_handles(picture.robot.tool_position, picture.operating_client)
+        now_s = time.monotonic()
+        if now_s - self._words_s >= WORDS_EVERY_S:
+            self._words_s = now_s
+            with server.atomic():
+                self._panel.draw(picture)

@@ -1,0 +1,210 @@
+"""What is loaded to be drawn: models, guides, robots; and who draws it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hmcs.bus.messages import Motion, RobotLooks, RobotState
+from hmcs.bus.service import UserError
+from hmcs_console.models import Guides, load_models, task_of
+from hmcs_console.painter import Painter
+from hmcs_console.robot_model import joints_of, load_robot, written
+from hmcs_console.seen import FORGOTTEN_S, Seen
+
+LOG = logging.getLogger("test")
+URDF = """<robot name="arm"><link name="base"/><link name="upper"><visual><geometry>
+<mesh filename="package://arm/upper.stl"/></geometry></visual></link>
+<joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+TRIANGLE = b"""solid t
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid t
+"""
+
+
+def test_models_are_found_in_files_and_folders(model_file: Path, tmp_path: Path) -> None:
+    assert [model.name for model in load_models([model_file])] == ["lines"]
+    assert [model.name for model in load_models([model_file.parent])] == ["lines"]
+    with pytest.raises(UserError, match="no model file"):
+        load_models([tmp_path])
+
+
+def test_the_task_is_the_named_one_else_that_of_the_first_model(model_file: Path) -> None:
+    models = load_models([model_file])
+    named, of_model = task_of("surface-2d", models), task_of(None, models)
+    assert named is not None
+    assert of_model is not None
+    assert (named.name, of_model.name) == ("surface-2d", "made-up")
+    assert task_of(None, ()) is None
+
+
+def test_a_guide_is_the_learned_path_with_the_volume_of_its_state(model_file: Path) -> None:
+    models = load_models([model_file])
+    guides = Guides(models)
+    free = guides.find("lines", "", "free", "line")
+    assert free is not None
+    assert_allclose(free.points[:, 0], [0, 0.25, 0.5])
+    assert free.volume is None
+    cone = guides.find("a shadow of it", models[0].hash, "in", "line")
+    assert cone is not None
+    assert cone.volume is not None
+    radii = np.linalg.norm(cone.volume.vertices[:, 1:], axis=1).reshape(3, -1)
+    assert_allclose(radii[:, 0], [0.05, 0.03, 0.01])
+
+
+def test_a_guide_nobody_knows_is_none(model_file: Path) -> None:
+    guides = Guides(load_models([model_file]))
+    assert guides.find("strange", "strange", "in", "line") is None
+    assert guides.find("lines", "", "in", "strange") is None
+
+
+def test_a_robot_is_loaded_with_the_meshes_that_came_with_it() -> None:
+    looks = RobotLooks(
+        robot="arm", urdf=URDF, joints=("j1",), files={"package://arm/upper.stl": TRIANGLE}
+    )
+    robot = load_robot(looks)
+    assert len(robot.scene.geometry) == 1
+
+
+def test_files_from_the_wire_stay_in_their_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    files = ("../../outside.stl", "/etc/outside.stl", "a/..", "..", "", "..\\..\\outside.stl")
+    names = written(dict.fromkeys(files, b"1"), folder)
+    assert set(names) == {"../../outside.stl", "/etc/outside.stl", "..\\..\\outside.stl"}
+    assert all(Path(place).resolve().is_relative_to(folder) for place in names.values())
+    assert list(tmp_path.rglob("*.stl")) == list(folder.rglob("*.stl"))
+
+
+def test_a_mesh_finds_its_materials_beside_it(tmp_path: Path) -> None:
+    names = written({"m/link.obj": b"1", "m/link.mtl": b"2", "n/link.obj": b"3"}, tmp_path)
+    assert Path(names["m/link.obj"]).with_suffix(".mtl").read_bytes() == b"2"
+    assert Path(names["n/link.obj"]).read_bytes() == b"3"
+
+
+def test_joints_the_description_does_not_know_are_left_out() -> None:
+    looks = RobotLooks(robot="arm", urdf=URDF, joints=("j1", "strange"), files={})
+    assert joints_of(looks, np.array([0.5, 0.7]), ("j1",)) == {"j1": 0.5}
+
+
+# --- what is kept ---------------------------------------------------------------------------------
+
+
+def robot_at(x_m: float) -> RobotState:
+    return RobotState(
+        robot="arm",
+        joint_positions=np.zeros(1),
+        joint_velocities=np.zeros(1),
+        tool_position=np.array([x_m, 0.0, 0.0]),
+        tool_orientation=np.array([0.0, 0.0, 0.0, 1.0]),
+        tool_twist=np.zeros(6),
+        reference_twist=np.zeros(6),
+        nearest_obstacle="",
+        nearest_distance_m=None,
+        contacts=(),
+        stop="none",
+        limited=(),
+    )
+
+
+def hand_at(x_m: float, **fields: Any) -> Motion:
+    held = {"dead_man": True} | fields
+    return Motion(position=np.array([x_m, 0.0, 0.0]), velocity=np.zeros(3), **held)
+
+
+def test_a_robot_that_fell_silent_is_not_shown_as_being_there() -> None:
+    seen = Seen(())
+    seen.robot_moved(10.0, robot_at(1.0))
+    assert seen.picture(10.0 + FORGOTTEN_S, "", None).robot is not None
+    assert seen.picture(10.1 + FORGOTTEN_S, "", None).robot is None
+
+
+def test_the_hands_trail_begins_at_the_tool_whenever_the_hand_takes_hold() -> None:
+    seen = Seen(())
+    seen.hand_moved(hand_at(5.0))
+    seen.robot_moved(10.0, robot_at(1.0))
+    for x_m in (7.0, 7.1):
+        seen.hand_moved(hand_at(x_m))
+    seen.hand_moved(hand_at(7.1, clutch=True))
+    seen.robot_moved(10.1, robot_at(2.0))
+    for x_m in (0.0, 0.2):
+        seen.hand_moved(hand_at(x_m))
+    segments, _ = seen.picture(10.1, "", None).hand_trail
+    assert_allclose(segments[:, :, 0], [[1.0, 1.1], [2.0, 2.2]], rtol=1e-6)
+
+
+# --- the painter ----------------------------------------------------------------------------------
+
+
+def wait_until(condition: Callable[[], object]) -> None:
+    deadline_s = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.005)
+
+
+def test_a_painter_that_hangs_holds_nobody_up_and_leaves_out_what_it_has_no_time_for() -> None:
+    drawn: list[int] = []
+    go_on = threading.Event()
+
+    def draw(number: int) -> None:
+        go_on.wait(10.0)
+        drawn.append(number)
+
+    painter = Painter(draw, 50.0, LOG)
+    began_s = time.monotonic()
+    painter.show(0.0, 0)
+    wait_until(lambda: painter.due(1e9))
+    for number in range(1, 1000):
+        painter.show(0.0, number)
+    assert time.monotonic() - began_s < 1.0
+    assert not painter.due(1e9)
+    time.sleep(0.05)
+    go_on.set()
+    wait_until(lambda: len(drawn) == 2)
+    wait_until(lambda: painter.due(1e9))
+    assert drawn == [0, 1]
+    painter.close()
+
+
+def test_a_slow_painter_is_shown_less() -> None:
+    painter = Painter(lambda _: time.sleep(0.05), 50.0, LOG)
+    painter.show(10.0, 0)
+    assert not painter.due(10.015)
+    wait_until(lambda: painter.rate_hz < 50.0)
+    painter.show(10.0, 1)
+    assert not painter.due(10.03)
+    painter.close()
+
+
+def test_a_failed_drawing_is_told_until_one_succeeds() -> None:
+    drawn: list[int] = []
+
+    def draw(number: int) -> None:
+        drawn.append(number)
+        if number == 0:
+            raise RuntimeError("no paint")
+
+    painter = Painter(draw, 50.0, LOG)
+    painter.show(0.0, 0)
+    wait_until(lambda: painter.failure)
+    assert painter.failure == "RuntimeError: no paint"
+    painter.show(0.0, 1)
+    wait_until(lambda: not painter.failure)
+    assert drawn == [0, 1]
+    painter.close()
