@@ -29,6 +29,12 @@ class ConsoleSettings(ServiceSettings):
     """Name of a task that comes along, or a task file, whose workspace is drawn; the task of the
     first model by default."""
 
+    @field_validator("token", mode="before")
+    @classmethod
+    def _empty_is_none(cls, token: object) -> object:
+        """An environment variable that is set to nothing."""
+        return None if token == "" else token
+
     @field_validator("token")
     @classmethod
     def _is_given_where_others_can_reach_the_page(
