@@ -49,16 +49,30 @@ class Asking:
         self._pool.submit(work)
 
     def request(
-        self, member: Member, verb: str, question: Message, told: Callable[[str], None]
+        self,
+        member: Member,
+        verb: str,
+        question: Message,
+        told: Callable[[str], None],
+        then: Callable[[], None] = lambda: None,
     ) -> None:
-        """Ask one process to do something; tell in one line what came of it."""
+        """Ask one process to do something; tell in one line what came of it.
+
+        `then` is called where it was done.
+        """
         key = self._bus.keys.rpc(member.service, member.instance, verb)
         silent = f"{member.service} gave no answer to {verb}"
+
+        def come(answers: list[Answer[Done]]) -> None:
+            told(answers[0].body.detail if answers else silent)
+            if answers:
+                then()
+
         self.ask(
             key,
             question,
             Done,
-            lambda answers: told(answers[0].body.detail if answers else silent),
+            come,
             lambda reason: told(f"{member.service} refused: {reason}"),
             timeout_s=5.0,
         )

@@ -24,6 +24,9 @@ class Wishes(Protocol):
     def ask(self, question: Question) -> None:
         """Have a process do something."""
 
+    def take_over(self) -> None:
+        """Have the fixture follow what was trained last."""
+
     def label(self, state: str) -> None:
         """Say in which state the hand is from now on; empty ends what was labeled."""
 
@@ -90,6 +93,12 @@ class Panel:
             train = gui.add_button("Train")
             self._progress = gui.add_progress_bar(0.0)
             self._training = gui.add_markdown("")
+            _on_click(
+                gui.add_button(
+                    "Activate what was trained", hint="As a recognizer beside the others"
+                ),
+                self._wishes.take_over,
+            )
 
         async def change_recording(event: viser.GuiEvent[Any]) -> None:
             self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))

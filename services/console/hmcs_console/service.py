@@ -143,6 +143,10 @@ class Console(Service):
         """Have a process do something."""
         self.page.put(partial(self._ask, question))
 
+    def take_over(self) -> None:
+        """Have the fixture follow what was trained last."""
+        self.page.put(self._take_over)
+
     def label(self, state: str) -> None:
         """Say in which state the hand is from now on."""
         self.page.put(partial(self._label, state))
@@ -184,13 +188,26 @@ class Console(Service):
                 now_s, self._seen.picture(now_s, operating.operator, operating.lease.client)
             )
 
-    def _ask(self, question: Question) -> None:
+    def _take_over(self) -> None:
+        questions = wishes.take_over(self._seen.training)
+        if not questions:
+            self._tell("nothing was trained yet: train first")
+        else:
+            self._ask(*questions)
+
+    def _ask(self, question: Question, *more: Question) -> None:
         member = first_of(question.service, self._seen.members)
         if member is None:
             self._tell(f"no {question.service} is there to {question.verb}: start one")
         else:
             self._tell(f"asking {question.service} to {question.verb} …")
-            self._asking.request(member, question.verb, question.body, self._tell)
+            self._asking.request(
+                member,
+                question.verb,
+                question.body,
+                self._tell,
+                lambda: self._ask(*more) if more else None,
+            )
 
     def _label(self, state: str) -> None:
         label = wishes.label(state, self._seen.clock, self._seen.step)

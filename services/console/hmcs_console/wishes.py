@@ -5,7 +5,16 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from hmcs.bus.messages import ActivateRecognizer, Label, Message, Record, Step, Train
+from hmcs.bus.messages import (
+    ActivateRecognizer,
+    Label,
+    LoadModel,
+    Message,
+    Record,
+    Step,
+    Train,
+    TrainingProgress,
+)
 
 
 class Question(NamedTuple):
@@ -24,6 +33,21 @@ def record(on: bool, name: str) -> Question:
 def activate(recognizer: str) -> Question:
     """Return the wish that the fixture follows a recognizer."""
     return Question("fixture_controller", "activate", ActivateRecognizer(model=recognizer))
+
+
+def take_over(trained: TrainingProgress | None) -> tuple[Question, ...]:
+    """Return the wishes, one after another, that make the fixture follow what was trained.
+
+    None where nothing was trained to its end.
+    """
+    if trained is None or trained.stage != "done":
+        return ()
+    load = LoadModel(path=trained.path)
+    return (
+        Question("fixture_controller", "load_model", load),
+        Question("recognizer", "load_model", load),
+        activate(trained.model),
+    )
 
 
 def train(model: str, task: str, demonstrations: str, recognizer: str) -> Question:

@@ -1,70 +1,75 @@
-"""The service: steps in, one call into the model's recognizer, beliefs out.
+"""The service: recognizers of any kind in one process, each a model of its own.
 
-The layered segment filter, too, runs here whole; as classifiers and a task HMM it is spread over
-processes.
+It begins with the model it is told, if any, and takes more while it runs. The layered segment
+filter, too, runs here whole; as classifiers and a task HMM it is spread over processes.
 """
 
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
-from hmcs.bus.messages import Belief
+from hmcs.bus.messages import Done, LoadModel
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus
-from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizers import kind_named, recognizer_of
-from hmcs.translation import belief_message, step_of
+from hmcs_recognizer.hosted import Hosted
 from hmcs_recognizer.settings import RecognizerSettings
 
 
 class RecognizerService(Service):
-    """Publishes a belief for every step."""
+    """Publishes a belief for every step and every model it has."""
 
     name = "recognizer"
     Settings = RecognizerSettings
+    settings: RecognizerSettings
 
     def __init__(self, settings: RecognizerSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model)
-        self._kind = kind_named(self._model.recognizer)
-        self._recognizer = recognizer_of(self._model)
-        self._ready = False
-        self._believed = 0
-        self._belief = bus.publisher(Belief, bus.keys.belief(self._model.name))
-        self._feed = StepFeed(
-            bus, log, self._on_step, self._on_restart, memory_steps=settings.memory_steps
-        )
+        self._hosted: dict[str, Hosted] = {}
+        if settings.model is not None:
+            self._take(settings.model)
 
     def start(self) -> None:
-        """Catch up with the motion so far; beliefs begin with the next step."""
-        self._feed.begin()
-        self._ready = True
-        self.bus.announce(
-            self.bus.keys.member(self._model.name, self.name, self.bus.source.instance)
-        )
+        """Catch up with the motion so far, and wait to be given more models."""
+        for hosted in self._hosted.values():
+            hosted.begin()
+        self.bus.answer("load_model", LoadModel, self._load)
 
     def health(self) -> tuple[bool, str]:
-        """Healthy always: a recognizer that waits for steps does what it is for."""
-        return True, f"{self._model.name}: {self._kind.name}, {self._believed} beliefs"
+        """Healthy always: a recognizer that waits for steps, or a model, does what it is for."""
+        if not self._hosted:
+            return True, "waits to be given a model"
+        return True, "; ".join(
+            f"{name}: {hosted.kind.name}, {hosted.believed} beliefs"
+            for name, hosted in self._hosted.items()
+        )
 
     def facts(self) -> dict[str, str]:
-        """Return the model and the kind of recognizer."""
+        """Return the models and their kinds of recognizer."""
+        every = list(self._hosted.values())
         return {
-            "model": self._model.name,
-            "model_hash": self._model.hash,
-            "recognizer": self._kind.name,
-            "what": self._kind.summary,
-            "source": self._kind.source,
+            "model": ", ".join(hosted.model.name for hosted in every),
+            "model_hash": ", ".join(hosted.model.hash for hosted in every),
+            "recognizer": ", ".join(hosted.kind.name for hosted in every),
+            "what": "; ".join(hosted.kind.summary for hosted in every),
+            "source": "; ".join(hosted.kind.source for hosted in every),
         }
 
-    def _on_restart(self, index: int) -> None:
-        # A motion that is joined in its middle may be in any state of the task.
-        self._recognizer = recognizer_of(self._model, anywhere=index > 0)
-        self.log.info("beginning anew", extra={"step": index})
+    def _load(self, asked: LoadModel) -> Done:
+        hosted = self._take(Path(asked.path))
+        if not hosted.at_work:
+            hosted.begin()
+        self.log.info("model loaded", extra={"model": hosted.model.name})
+        return Done(detail=f"{hosted.model.name} {hosted.model.hash} is at work")
 
-    def _on_step(self, fed: FedStep) -> None:
-        recognition = self._recognizer.step(step_of(fed.step))
-        if self._ready:
-            self._believed += 1
-            self._belief.put(belief_message(self._model, recognition, fed.clock), fed.origin)
+    def _take(self, path: Path) -> Hosted:
+        """Work with a model file; raises ModelFileError where it cannot be used."""
+        model = load_model(path)
+        known = self._hosted.get(model.name)
+        if known is not None:
+            known.renew(model)
+            return known
+        hosted = Hosted(model, self.bus, self.log, self.name, self.settings.memory_steps)
+        self._hosted[model.name] = hosted
+        return hosted

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from hmcs.bus.messages import Step
+from hmcs.bus.messages import LoadModel, Step
 from hmcs.bus.service import Service
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
@@ -109,3 +110,33 @@ def test_a_file_that_is_no_model_is_told(tmp_path: Path, bench: Bench) -> None:
 def test_a_memory_out_of_range_is_refused(memory_steps: int) -> None:
     with pytest.raises(ValidationError, match="memory_steps"):
         RecognizerSettings(model=Path("any.hmcs"), memory_steps=memory_steps)
+
+
+def test_it_takes_another_model_while_it_runs(bench: Bench, taught: Taught, tmp_path: Path) -> None:
+    another = tmp_path / "another.hmcs"
+    save_model(taught.model._replace(name="another"), another)
+    steps = steps_performed(6)[:30]
+    for step in steps[:10]:
+        bench.scene.hand.step(step)
+    bench.until_believed(10)
+    scene = bench.scene
+    with ThreadPoolExecutor(1) as aside:
+        loading = aside.submit(bench.service._load, LoadModel(path=str(another)))
+        while not loading.done():
+            scene.bus.pump(0.01)
+    assert loading.result().detail.startswith("another ")
+    for step in steps[10:]:
+        scene.hand.step(step)
+    bench.until_believed(10 + 2 * 20)
+    by_name: dict[str, list[int]] = {taught.model.name: [], "another": []}
+    for received in scene.watcher.beliefs:
+        by_name[received.key.split("/")[-2]].append(received.body.step)
+    assert by_name[taught.model.name] == [step.index for step in steps]
+    assert by_name["another"] == [step.index for step in steps[10:]]
+    told = [r.body for r in scene.watcher.beliefs if r.body.step == steps[-1].index]
+    np.testing.assert_array_equal(told[0].probabilities, told[1].probabilities)
+
+
+def test_without_a_model_it_waits_to_be_given_one() -> None:
+    assert RecognizerSettings(model="").model is None
+    assert RecognizerSettings().model is None
