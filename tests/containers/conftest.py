@@ -35,6 +35,7 @@ class Containers:
         self._environment = {
             **os.environ,
             "HMCS_ROUTER_PORT": str(port),
+            "HMCS_CONSOLE_PORT": str(free_port()),
             "HMCS_CELL": self.cell,
             # On a machine that also builds and starts containers, late is not yet missing.
             "HMCS_DEADLINE_MS": "500",

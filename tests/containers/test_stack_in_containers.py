@@ -14,7 +14,10 @@ from hmcs.bus.session import Bus, Received
 
 pytestmark = pytest.mark.containers
 
-SERVICES = {"input_device", "gesteme_classifier", "task_hmm", "fixture_controller", "robot"}
+SERVICES = {
+    *("input_device", "gesteme_classifier", "task_hmm", "fixture_controller", "robot"),
+    *("recognizer", "recorder", "trainer", "console"),
+}
 CLASSIFIER = "gesteme_classifier"
 STEPS_AFTER = 20
 """Steps watched after a swap: two seconds and more of motion."""
