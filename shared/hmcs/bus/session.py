@@ -10,7 +10,7 @@ import itertools
 import logging
 import secrets
 import time
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -49,6 +49,9 @@ __all__ = [
     "Timer",
     "Token",
 ]
+
+LISTENING_BOUND = 50_000
+"""Messages a listener may have waiting; more are lost, and so counted."""
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -235,17 +238,27 @@ class Bus:
         self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
         self.subscribes.append(key)
 
-    def listen(self, key: str, handler: Callable[[Arrival], None]) -> None:
+    def listen(self, key: str, handler: Callable[[Arrival], None], every_s: float = 0.02) -> None:
         """Hand everything on `key` to `handler` as it arrived, each one in order, undecoded.
 
-        For observers who keep whatever there is; what finds no place to wait is told to
-        `handler` by the gap in the numbers, as all losses are.
+        For observers who keep whatever there is and are in no hurry: they are handed what came
+        together, every `every_s`, which costs a fraction of waking up for each. What finds no
+        place to wait is told by the gap in its numbers, as all losses are.
         """
-        box = EveryOne(self._mailbox, handler, lambda: self._reader.overflowed(key))
+        waiting: deque[Arrival] = deque()
 
         def arrive(sample: zenoh.Sample) -> None:
             now_ns = time.monotonic_ns()
-            box.arrive(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns))
+            if len(waiting) < LISTENING_BOUND:
+                waiting.append(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns))
+
+        def hand_on() -> None:
+            if len(waiting) >= LISTENING_BOUND:
+                self._reader.overflowed(key)
+            for _ in range(len(waiting)):
+                handler(waiting.popleft())
+
+        self.every(every_s, hand_on)
 
         self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
         self.subscribes.append(key)

@@ -17,6 +17,8 @@ PREFIX = "/foxglove/"
 """Of the topics."""
 BASE, OPERATOR = "base", "operator"
 """Frames: of the robot's base, and of the operator's device."""
+SHOWN_EVERY_NS = 33_000_000
+"""A pose or a posture is written once in such a time: more than that nobody sees."""
 TRAIL_POSES = 200
 """So many poses of the tool make the path."""
 TRAIL_EVERY_NS = 100_000_000
@@ -58,6 +60,7 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     },
 }
 """JSON Schema by name."""
+_MOTION, _ROBOT_STATE = schema_of(Motion), schema_of(RobotState)
 _UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
 
@@ -75,14 +78,20 @@ class Showing:
     def __init__(self) -> None:
         self._trail: deque[dict[str, Any]] = deque(maxlen=TRAIL_POSES)
         self._grown_ns = self._told_ns = -TRAIL_TOLD_NS
+        self._shown_ns: dict[str, int] = {}
 
     def of(self, fields: dict[str, Any], log_ns: int) -> Iterator[Shown]:
         """Yield what is to be shown of a message, by its fields as `fields_of` gives them."""
-        if fields["schema"] == schema_of(Motion):
+        schema = fields["schema"]
+        if schema not in (_MOTION, _ROBOT_STATE):
+            return
+        if log_ns - self._shown_ns.get(schema, -SHOWN_EVERY_NS) < SHOWN_EVERY_NS:
+            return
+        self._shown_ns[schema] = log_ns
+        if schema == _MOTION:
             turned = fields["orientation"] or _UPRIGHT
             pose = _pose(fields["position"], turned)
             yield Shown(f"{PREFIX}hand", "foxglove.PoseInFrame", _in_frame(log_ns, OPERATOR, pose))
-        if fields["schema"] != schema_of(RobotState):
             return
         pose = _pose(fields["tool_position"], fields["tool_orientation"])
         yield Shown(f"{PREFIX}tool", "foxglove.PoseInFrame", _in_frame(log_ns, BASE, pose))

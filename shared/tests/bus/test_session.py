@@ -12,7 +12,7 @@ from hmcs.bus.examples import ENVELOPE
 from hmcs.bus.keys import KeyNameError
 from hmcs.bus.messages import Ask, Motion, Origin, Source, Step
 from hmcs.bus.session import Bus, BusUnavailableError, StoppedError
-from hmcs.bus.wire import encode
+from hmcs.bus.wire import decode, encode
 
 ORIGIN = Origin(boot="hand", seq=3, captured_ns=7)
 
@@ -366,3 +366,19 @@ def test_direct_processes_hear_each_other_and_those_behind_the_router(join, unti
     assert not near.counters.lost
     indices = [received.body.index for received in got_near]
     assert indices == sorted(set(indices))
+
+
+def test_a_listener_gets_everything_in_order_as_it_came(pair) -> None:
+    sender, listener, publisher = pair
+    got = []
+    listener.listen(listener.keys.everything, got.append, every_s=0.005)
+    put_motion = publisher(Motion, sender.keys.motion).put
+    put_step = publisher(Step, sender.keys.step).put
+    for k in range(50):
+        put_motion(motion(k))
+        put_step(step(k))
+    receive(listener, got, 100)
+    assert sorted({arrival.key for arrival in got}) == [sender.keys.motion, sender.keys.step]
+    of_motion = [arrival for arrival in got if arrival.key == sender.keys.motion]
+    told = [decode(arrival.payload, Motion)[1] for arrival in of_motion]
+    assert [body.position[0] for body in told] == list(range(50))
