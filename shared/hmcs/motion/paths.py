@@ -66,7 +66,7 @@ class Path:
         """
         pieces = self._pieces
         s = np.minimum(np.maximum(arc_length, 0.0), pieces.ends[-1])
-        piece = np.searchsorted(pieces.starts, s, side="right") - 1
+        piece = pieces.starts.searchsorted(s, side="right") - 1
         beyond = (s - pieces.starts[piece])[..., None]
         return np.asarray(pieces.first[piece] + beyond * pieces.directions[piece])
 
@@ -83,7 +83,7 @@ class Path:
             length_m = np.sqrt(chord @ chord)
             if length_m > 0:
                 return np.asarray(chord / length_m)
-        piece = int(np.searchsorted(self._pieces.starts, s, side="right")) - 1
+        piece = int(self._pieces.starts.searchsorted(s, side="right")) - 1
         return np.asarray(self._pieces.directions[piece])
 
     def project(
@@ -101,22 +101,22 @@ class Path:
             upper = max(min(near + window_m, self.length_m), lower)
         pieces = self._pieces
         inside = slice(
-            np.searchsorted(pieces.ends, lower, side="left"),
-            np.searchsorted(pieces.starts, upper, side="right"),
+            int(pieces.ends.searchsorted(lower)),
+            int(pieces.starts.searchsorted(upper, side="right")),
         )
-        first, starts = pieces.first[inside], pieces.starts[inside]
-        directions = pieces.directions[inside]
-        beside = np.asarray(point, dtype=float) - first
-        along = (beside * directions).sum(axis=1)
-        along = np.minimum(np.maximum(along, 0.0), pieces.ends[inside] - starts)
-        along = np.minimum(np.maximum(along, lower - starts), upper - starts)
-        beside -= along[:, None] * directions
-        distance = np.sqrt((beside * beside).sum(axis=1))
-        s = starts + along
-        if near is None:
-            return float(s[distance.argmin()])
-        ties = np.flatnonzero(distance <= distance.min() + _TIE * self.length_m)
-        return float(s[ties[np.abs(s[ties] - near).argmin()]])
+        starts, directions = pieces.starts[inside], pieces.directions[inside]
+        beside = np.asarray(point, dtype=float) - pieces.first[inside]
+        along = starts + np.einsum("ij,ij->i", beside, directions)
+        s = np.minimum(
+            np.maximum(along, np.maximum(starts, lower)), np.minimum(pieces.ends[inside], upper)
+        )
+        beside -= (s - starts)[:, None] * directions
+        distance = np.sqrt(np.einsum("ij,ij->i", beside, beside))
+        best = int(distance.argmin())
+        if near is None or len(s) == 1:
+            return float(s[best])
+        ties = (distance <= distance[best] + _TIE * self.length_m).nonzero()[0]
+        return float(s[best] if len(ties) == 1 else s[ties[np.abs(s[ties] - near).argmin()]])
 
 
 def resample(points: ArrayLike, count: int) -> FloatArray:
