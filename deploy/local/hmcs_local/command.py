@@ -264,6 +264,17 @@ def train(
 
 
 @app.command()
+def devices() -> None:
+    """List input devices: which are here, which are missing, and what to do about it.
+
+    The exit code is 0 where one is ready, else 1.
+    """
+    from hmcs_local.devices import show_devices
+
+    raise typer.Exit(0 if show_devices(Console()) else 1)
+
+
+@app.command()
 def record(
     name: Annotated[str, typer.Argument(help="Of the file; by date and time if none.")] = "",
     stop: Annotated[bool, typer.Option("--stop", help="End the recording.")] = False,

@@ -1,8 +1,9 @@
-"""The sources that come along: files that are played, simulated operators, a page's handle."""
+"""The sources that come along: files that are played, simulated operators, a page, devices."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from hmcs.motion.paths import Path
 from hmcs.motion.references import References, random_gesteme, random_performance
 from hmcs.recognition.model_file import load_model
 from hmcs.task import AXES, Task
+from hmcs_input_device.devices.kinds import KINDS, source_of
 from hmcs_input_device.held import page
 from hmcs_input_device.logged import recording
 from hmcs_input_device.playback import Passes, Playback
@@ -110,6 +112,7 @@ BUILT_IN: Mapping[str, SourceFactory] = {
     "simulated": simulated,
     "recording": recording,
     "page": page,
+    **{kind.name: partial(source_of, kind) for kind in KINDS},
 }
 """Sources that need no other distribution."""
 

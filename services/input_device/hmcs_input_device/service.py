@@ -37,6 +37,7 @@ from hmcs_input_device.sources import (
     HearsHandle,
     SeesRobot,
     Source,
+    Troubled,
     open_source,
 )
 
@@ -88,6 +89,8 @@ class InputDevice(Service):
         """Return whether it publishes, and what it plays or waits for."""
         if self._silent:
             return False, self._silent
+        if isinstance(self._source, Troubled) and self._source.trouble:
+            return False, self._source.trouble
         if problem := self._no_step_possible():
             return False, problem
         return True, self._doing()

@@ -5,9 +5,65 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from hmcs.bus.settings import ServiceSettings
+
+AxisName = Literal["x", "y", "z", "rx", "ry", "rz", "-x", "-y", "-z", "-rx", "-ry", "-rz", "none"]
+"""An axis of a device, the same the other way round, or none."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+class DeviceAxes(_Part):
+    """Which axis of the device moves the hand along each axis of the operator frame.
+
+    By default as is usual for the device.
+    """
+
+    x: AxisName | None = None
+    """Forward."""
+    y: AxisName | None = None
+    """To the left."""
+    z: AxisName | None = None
+    """Up."""
+
+
+class DeviceButtons(_Part):
+    """Which button means what, by the device's own names; by default as is usual for it."""
+
+    dead_man: str | None = Field(default=None, min_length=1)
+    """Held, it lets the hand move."""
+    clutch: str | None = Field(default=None, min_length=1)
+    """Held, it lets the device be moved without the hand."""
+    pedal: str | None = Field(default=None, min_length=1)
+    """Marks where another part of the task begins."""
+
+
+class DeviceSettings(_Part):
+    """How a gamepad, SpaceMouse, keyboard or mouse moves the hand."""
+
+    which: str = ""
+    """A part of the name of the gamepad or SpaceMouse; the first that is there by default."""
+    axes: DeviceAxes = DeviceAxes()
+    """Which axis of the device moves the hand where."""
+    buttons: DeviceButtons = DeviceButtons()
+    """Which button means what."""
+    scale_m_s: float = Field(default=0.15, gt=0.0, le=0.5)
+    """Speed of the hand at full deflection, and the greatest one that a mouse gives it."""
+    dead_band: float = Field(default=0.1, ge=0.0, le=0.9)
+    """Share of the full deflection up to which an axis counts as let go of."""
+    jump: float = Field(default=1.0, gt=0.0, le=2.0)
+    """An axis that changes by more of its full deflection from one reading to the next moves
+    nothing by it."""
+    m_per_pixel: float = Field(default=0.0005, gt=0.0, le=0.01)
+    """How far the hand goes while the pointer of a mouse goes a pixel."""
+    jump_pixels: float = Field(default=200.0, gt=0.0)
+    """A pointer that goes farther from one reading to the next moves nothing by it."""
 
 
 class InputDeviceSettings(ServiceSettings):
@@ -16,8 +72,8 @@ class InputDeviceSettings(ServiceSettings):
     task: str = "human-shapes"
     """Name of a task that comes along, or path of a task file."""
     source: str = "synthetic"
-    """`recorded`, `synthetic`, `simulated`, or the name of a device that another distribution
-    adds."""
+    """`recorded`, `synthetic`, `simulated`, `recording`, `page`, a device (`gamepad`, `spacemouse`,
+    `keyboard`, `mouse`), or the name of one that another distribution adds."""
     dead_zone_m: float | None = Field(default=None, gt=0, le=0.2)
     """δ: the shortest motion that counts as a step; the task's by default."""
     steps_kept: int = Field(default=4096, ge=2000, le=10_000)
@@ -71,5 +127,7 @@ class InputDeviceSettings(ServiceSettings):
     primitive_scale: float = Field(default=0.2, gt=0.0)
     """Size of those: 1 makes lines 0.5 to 1.5 m long, as in the thesis' study."""
 
+    device: DeviceSettings = DeviceSettings()
+    """How a gamepad, SpaceMouse, keyboard or mouse moves the hand."""
     options: dict[str, Any] = Field(default_factory=dict)
     """What a device of another distribution is told."""

@@ -95,6 +95,15 @@ class HearsHandle(Protocol):
         """Be told the time of the next sample, by the clock of `handled`."""
 
 
+@runtime_checkable
+class Troubled(Protocol):
+    """A source that may be there, at rest, and yet of no use."""
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing moves, and what to do; empty while all is well."""
+
+
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]
 """Makes a source; raises UserError where the settings do not let it."""
 

@@ -137,7 +137,13 @@ def test_a_dead_zone_larger_than_the_motion_makes_a_simulated_device_unhealthy(
         (["--dead-zone-m", "0.2", "--demonstration", "SMALL"], "less than the dead zone of 0.2 m"),
         (["--demonstration", "none.csv"], "none.csv: cannot be read"),
         (["--task", "none"], "human-shapes, lines-through-obstacles"),
-        (["--source", "mouse"], "choose of: page, recorded, recording, simulated, synthetic"),
+        (
+            ["--source", "joystick"],
+            "choose of: gamepad, keyboard, mouse, page, recorded, recording, simulated, spacemouse,"
+            " synthetic",
+        ),
+        (["--device", '{"axes": {"x": "up"}}'], "device.axes.x"),
+        (["--source", "gamepad", "--device.axes.z", "rz"], "this device has no axis 'rz'"),
         (["--rate-hz", "7"], "rate_hz"),
     ],
 )

@@ -179,6 +179,8 @@ def test_a_device_that_cannot_be_loaded_or_is_not_there_is_a_users_mistake() -> 
     with pytest.raises(UserError, match=r"fake_arm:nothing.*cannot be loaded"):
         opened(source="broken")
     with pytest.raises(
-        UserError, match="choose of: arm, broken, page, recorded, recording, simulated, synthetic"
+        UserError,
+        match="choose of: arm, broken, gamepad, keyboard, mouse, page, recorded, recording, "
+        "simulated, spacemouse, synthetic",
     ):
         opened(source="joystick")

@@ -1,4 +1,4 @@
-"""Trains once and ends: what compose runs before the stack, with the CLI of `hmcs train`."""
+"""Trains once and ends, with the CLI of `hmcs train`; or, told to `serve`, waits to be asked."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import json
 import sys
 from collections.abc import Sequence
 
+from hmcs.bus.service import run
 from hmcs.errors import UserError
 from hmcs.recognition.recognizers import DEFAULT
 from hmcs.task import load_task
 from hmcs_trainer.performance import perform
+from hmcs_trainer.service import Trainer
 from hmcs_trainer.training import train
 
 
@@ -26,6 +28,9 @@ def tell_fits(done: int, count: int) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run with these arguments; return the exit code, 2 for a mistake of the user."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if words[:1] == ["serve"]:
+        return run(Trainer, words[1:])
     parser = argparse.ArgumentParser(prog="hmcs_trainer", description=__doc__)
     parser.add_argument("task", help="name of a shipped task or a task file")
     parser.add_argument(
@@ -45,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--tell", action="store_true", help="tell what is done on stdout, a line of JSON each"
     )
-    given = parser.parse_args(argv)
+    given = parser.parse_args(words)
     if bool(given.performance) != bool(given.performance_output):
         parser.error("--performance and --performance-output go together")
     try:

@@ -11,7 +11,8 @@ import pytest
 from hmcs.bus.messages import Ask, Train, TrainingProgress
 from hmcs.bus.session import RequestRefusedError
 from hmcs.recognition.model_file import load_model
-from hmcs_trainer.serving import Trainer, TrainerSettings
+from hmcs_trainer.service import Trainer
+from hmcs_trainer.settings import TrainerSettings
 from support.stack import Stack
 
 DRAWINGS = tuple(f"lasa:{s}/1-2" for s in ("GShape", "NShape", "PShape", "JShape", "Snake"))

@@ -1,7 +1,4 @@
-"""The service: trains when asked, in a process of its own, and tells how far it is.
-
-`python -m hmcs_trainer.serving`; `python -m hmcs_trainer` trains once and ends.
-"""
+"""The service: trains when asked, in a process of its own, and tells how far it is."""
 
 from __future__ import annotations
 
@@ -14,28 +11,17 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import IO
 
-from pydantic import Field
-
 from hmcs.bus.keys import check_name
 from hmcs.bus.messages import Ask, Done, Train, TrainingProgress
-from hmcs.bus.service import Service, run
+from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
-from hmcs.bus.settings import ServiceSettings
 from hmcs.recognition.recognizers import DEFAULT
+from hmcs_trainer.settings import TrainerSettings
 
 TOLD_EVERY_S = 0.1
 _JUDGING = "judging"
 _LEARNED_SHARE = 0.5
 """Of the whole, where learning has ended and judging begins."""
-
-
-class TrainerSettings(ServiceSettings):
-    """Settings of the trainer: where models go."""
-
-    folder: Path = Path("out/up/models")
-    """Where models and their report pages are written."""
-    stop_grace_s: float = Field(default=2.0, gt=0.0)
-    """A training that is canceled has so long to end by itself."""
 
 
 class Trainer(Service):
@@ -210,7 +196,3 @@ def _read(stream: IO[str], take: object) -> None:
     assert callable(take)
     for line in stream:
         take(line.rstrip("\n"))
-
-
-if __name__ == "__main__":
-    raise SystemExit(run(Trainer))

@@ -1,0 +1,18 @@
+"""What the trainer can be told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+
+from hmcs.bus.settings import ServiceSettings
+
+
+class TrainerSettings(ServiceSettings):
+    """Settings of the trainer: where models go."""
+
+    folder: Path = Path("out/up/models")
+    """Where models and their report pages are written."""
+    stop_grace_s: float = Field(default=2.0, gt=0.0)
+    """A training that is canceled has so long to end by itself."""
