@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from itertools import islice
 
 from pydantic import ValidationError
@@ -25,8 +26,10 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.errors import UserError
 from hmcs.motion.steps import DeadZone
 from hmcs.task import load_task
+from hmcs_input_device.frames import TaskFrame
 from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
@@ -42,6 +45,8 @@ from hmcs_input_device.sources import (
 )
 
 _NS_PER_S = 1_000_000_000
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+"""No turn."""
 
 
 class InputDevice(Service):
@@ -56,6 +61,7 @@ class InputDevice(Service):
         self._task = load_task(settings.task)
         self._dead_zone_m = settings.dead_zone_m or self._task.dead_zone_m
         self._source: Source = open_source(settings, self._task, BUILT_IN)
+        self._frame = _frame_of(settings, self._source)
         self._rate_hz = settings.rate_hz or self._source.rate_hz
         self._reaction = _reaction_of(self._source)
         self._zone = DeadZone(self._dead_zone_m)
@@ -136,7 +142,7 @@ class InputDevice(Service):
 
     def _publish(self, sample: DeviceSample, now_ns: int) -> None:
         try:
-            motion = Motion(**sample._asdict())
+            motion = Motion(**self._frame(sample)._asdict())
         except ValidationError as error:
             reason = f"{error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}"
             self._silent = f"the source {self.settings.source!r} gives samples that are none"
@@ -245,3 +251,20 @@ class InputDevice(Service):
 
 def _reaction_of(source: Source) -> Reaction | None:
     return source.reaction if isinstance(source, (ReEngaging, Simulated)) else None
+
+
+def _frame_of(
+    settings: InputDeviceSettings, source: Source
+) -> Callable[[DeviceSample], DeviceSample]:
+    """What tells samples along the axes of the robot's base.
+
+    Raises UserError for a source that has them already.
+    """
+    if settings.task_frame_xyzw == IDENTITY:
+        return lambda sample: sample
+    if isinstance(source, SeesRobot):
+        raise UserError(
+            f"task_frame_xyzw: the operator of {settings.source!r} sees the robot in its base "
+            "frame: leave it out"
+        )
+    return TaskFrame(settings.task_frame_xyzw).in_base

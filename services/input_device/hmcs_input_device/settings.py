@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from hmcs.bus.settings import ServiceSettings
+from hmcs.motion.quaternions import is_unit
 
 AxisName = Literal["x", "y", "z", "rx", "ry", "rz", "-x", "-y", "-z", "-rx", "-ry", "-rz", "none"]
 """An axis of a device, the same the other way round, or none."""
@@ -76,6 +77,10 @@ class InputDeviceSettings(ServiceSettings):
     `keyboard`, `mouse`), or the name of one that another distribution adds."""
     dead_zone_m: float | None = Field(default=None, gt=0, le=0.2)
     """δ: the shortest motion that counts as a step; the task's by default."""
+    task_frame_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    """How the frame the device is moved in is turned in the robot's base frame, x y z w: an
+    operator who stands across from the robot, or works on a slanted table, keeps their own axes.
+    Not of `simulated`, who sees the robot in its base frame."""
     steps_kept: int = Field(default=4096, ge=2000, le=10_000)
     """How many steps can be asked for again."""
 
@@ -131,3 +136,12 @@ class InputDeviceSettings(ServiceSettings):
     """How a gamepad, SpaceMouse, keyboard or mouse moves the hand."""
     options: dict[str, Any] = Field(default_factory=dict)
     """What a device of another distribution is told."""
+
+    @field_validator("task_frame_xyzw")
+    @classmethod
+    def _is_a_rotation(
+        cls, value: tuple[float, float, float, float]
+    ) -> tuple[float, float, float, float]:
+        if not is_unit(value):
+            raise ValueError(f"{list(value)} is no unit quaternion x y z w")
+        return value

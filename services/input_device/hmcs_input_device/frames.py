@@ -1,0 +1,40 @@
+"""Device and robot may stand turned against each other: samples are told in the robot's axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.motion.quaternions import product, rotation_matrix
+from hmcs_input_device.sources import DeviceSample
+
+FloatArray = NDArray[np.float64]
+
+
+class TaskFrame:
+    """The frame the operator moves in, by how it is turned in the robot's base frame."""
+
+    def __init__(self, orientation: tuple[float, float, float, float]) -> None:
+        """Be turned by the quaternion `orientation`, x y z w.
+
+        Raises ValueError where it is no rotation.
+        """
+        self._orientation = np.array(orientation)
+        self._rotation = rotation_matrix(self._orientation)
+
+    def in_base(self, sample: DeviceSample) -> DeviceSample:
+        """Return a sample, told in the operator's frame, along the axes of the robot's base."""
+        return sample._replace(
+            position=self._rotation @ sample.position,
+            velocity=self._rotation @ sample.velocity,
+            orientation=None
+            if sample.orientation is None
+            else product(self._orientation, sample.orientation),
+            angular_velocity=self._turned(sample.angular_velocity),
+            wrench=None
+            if sample.wrench is None
+            else (self._rotation @ sample.wrench.reshape(2, 3).T).T.ravel(),
+        )
+
+    def _turned(self, vector: FloatArray | None) -> FloatArray | None:
+        return None if vector is None else self._rotation @ vector
