@@ -28,7 +28,7 @@ _PAGE = Template(
   body { font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #222; max-width: 60rem;
          margin: 0 auto; padding: 1.5rem; background: #fff; }
   h1 { font-size: 1.6rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
-  svg { width: 100%; height: auto; } li { margin: .3rem 0; }
+  svg { max-width: 100%; height: auto; } li { margin: .3rem 0; }
   .numbers { font-size: 1.1rem; } .small { color: #555; font-size: .9rem; }
 </style>
 </head>
