@@ -42,6 +42,9 @@ from hmcs_console.wishes import Question
 
 TAKE_EVERY_S = 0.01
 """How often what viewers did is taken, and leases are looked at."""
+HANDLE_HZ = 30.0
+"""How often a held handle is told, however seldom the page is drawn: one that is silent for longer
+than a few of these counts as let go."""
 HEALTH_EVERY_S = 2.0
 UNWATCHED_EVERY_S = 1.0
 """How often is drawn while nobody looks, so that who comes sees how it is."""
@@ -89,7 +92,8 @@ class Console(Service):
         bus.subscribe(TrainingProgress, keys.training, self._on_training)
         bus.watch(keys.presence(ANY, ANY), self._on_presence)
         bus.every(TAKE_EVERY_S, self._take)
-        bus.every(1 / self.settings.rate_hz, self._tell_and_show)
+        bus.every(1 / HANDLE_HZ, self._tell_handle)
+        bus.every(1 / self.settings.rate_hz, self._show)
         bus.every(EVERY_S, lambda: seen.write_down(time.monotonic()))
         bus.every(HEALTH_EVERY_S, self._ask_health)
         self.log.info("page", extra={"url": self.url})
@@ -175,11 +179,13 @@ class Console(Service):
             operator = self._operating.operator
             self.log.info("operated" if operator else "let go", extra={"operator": operator})
 
-    def _tell_and_show(self) -> None:
-        now_s = time.monotonic()
-        handle = self._operating.handle(now_s)
+    def _tell_handle(self) -> None:
+        handle = self._operating.handle(time.monotonic())
         if handle is not None:
             self._handles.put(handle)
+
+    def _show(self) -> None:
+        now_s = time.monotonic()
         watched = self.page.viewers > 0 or now_s >= self._unwatched_until_s
         if watched and self._painter.due(now_s):
             self._unwatched_until_s = now_s + UNWATCHED_EVERY_S

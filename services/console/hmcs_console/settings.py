@@ -20,7 +20,7 @@ class ConsoleSettings(ServiceSettings):
     token: SecretStr | None = Field(default=None, min_length=8, validate_default=True)
     """Who opens the page with `?token=…` is let in; without one everybody on this machine is."""
     rate_hz: float = Field(default=30.0, ge=2, le=100)
-    """How often the page is drawn at best, and how often a held handle is told."""
+    """How often the page is drawn at best."""
     lease_s: float = Field(default=0.25, ge=0.1, le=2.0)
     """An operator whose page gives no sign of life for so long has let go."""
     models: tuple[Path, ...] = ()

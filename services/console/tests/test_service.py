@@ -77,7 +77,17 @@ def test_who_brings_the_token_is_let_in_and_nobody_else(make_cell: MakeCell) -> 
     assert get(url, Cookie=headers["Set-Cookie"].partition(";")[0])[0] == 200
 
 
-def test_a_held_handle_is_told_at_the_rate_and_released_once_the_lease_lapses(
+def test_a_held_handle_is_told_often_however_seldom_the_page_is_drawn(make_cell: MakeCell) -> None:
+    cell = make_cell(lease_s=2.0, rate_hz=2)
+    grab(cell)
+    count = len(cell.handles)
+    cell.wait(0.9)
+    told = cell.handles[count:]
+    assert all(handle.dead_man for _, handle in told)
+    assert len(told) > 15
+
+
+def test_a_held_handle_is_told_at_a_rate_and_released_once_the_lease_lapses(
     make_cell: MakeCell,
 ) -> None:
     cell = make_cell(lease_s=0.4, rate_hz=50)

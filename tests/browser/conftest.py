@@ -1,0 +1,89 @@
+"""A browser, and pages in it that leave a picture behind."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import shutil
+import stat
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from browser.viewing import TASK, Cell, Viewer
+from support.stack import Stack
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    # Two pages of one test are both in front.
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
+)
+PATIENT_MS = 400
+OPERATED = (
+    # A browser without graphics hardware leaves them little of the machine; whether they stop in
+    # time for one another is for other tests to show.
+    ("robot", "--task", TASK, "--hang-s", PATIENT_MS / 1e3),
+    (
+        "fixture_controller",
+        *("--input-stale-after-ms", PATIENT_MS, "--command-valid-for-ms", PATIENT_MS),
+    ),
+    ("input_device", "--source", "page", "--task", TASK),
+)
+
+OpenViewer = Callable[..., Viewer]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "browser: needs playwright and a chromium")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A chromium that yields to the processes that are tested."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is installed")
+    yielding = tmp_path_factory.mktemp("browser") / "chromium"
+    yielding.write_text(f'#!/bin/sh\nexec nice -n 10 "{program}" "$@"\n', encoding="utf-8")
+    yielding.chmod(stat.S_IRWXU)
+    with api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=yielding, args=list(FLAGS))
+        try:
+            yield started
+        finally:
+            started.close()
+
+
+@pytest.fixture
+def open_viewer(browser: Any, request: pytest.FixtureRequest) -> Iterator[OpenViewer]:
+    """Open pages; each is pictured when the test has ended, however it did, and closed."""
+    viewers: list[Viewer] = []
+
+    def open_one(cell: Cell, **settings: Any) -> Viewer:
+        viewers.append(Viewer(browser, cell, **settings))
+        return viewers[-1]
+
+    yield open_one
+    name = re.sub(r"\W+", "-", request.node.name)
+    for number, viewer in enumerate(viewers, start=1):
+        with contextlib.suppress(Exception):
+            viewer.keep_picture(name if len(viewers) == 1 else f"{name}-{number}")
+        with contextlib.suppress(Exception):
+            viewer.close()
+
+
+@pytest.fixture
+def operated(browser: Any, stack: Stack) -> Cell:
+    """A robot that follows the handle of the page."""
+    del browser  # Without one no process needs to be started.
+    cell = Cell(stack, *OPERATED)
+    stack.until(lambda: cell.heard.robot)
+    return cell

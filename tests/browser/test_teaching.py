@@ -1,0 +1,168 @@
+"""The whole loop on the page: record, label, train, activate, and be recognized.
+
+Buttons and texts are the page's own; the hand, which would take minutes by mouse, is a script that
+tells what the page would tell of its handle.
+"""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from numpy.typing import NDArray
+
+from browser.viewing import Cell, Viewer
+from hmcs.bus.messages import Belief, FixtureState, Handle, Label, Step
+from hmcs.bus.session import Received
+from support.stack import CELL, Stack
+
+pytestmark = pytest.mark.browser
+OpenViewer = Callable[..., Viewer]
+
+STATES = ("out", "up", "back")
+TASK = {
+    "format": "hmcs-task/1",
+    "name": "triangle",
+    "dead_zone_m": 0.01,
+    "gestemes": [{"name": f"go-{state}"} for state in STATES],
+    "states": [
+        {"name": "out", "gestemes": ["go-out"], "next": ["up"]},
+        {"name": "up", "gestemes": ["go-up"], "next": ["back"]},
+        {"name": "back", "gestemes": ["go-back"], "next": ["out"]},
+    ],
+    "start": ["out"],
+    "workspace": {"lower_m": [0.3, -0.5, 0.1], "upper_m": [0.9, 0.5, 0.9], "obstacles": []},
+    "robot": {
+        "model": "puma560",
+        "tool_start_m": [0.6, 0.1, 0.4],
+        "tool_orientation_xyzw": [0.0, 0.7071067811865476, 0.0, 0.7071067811865476],
+    },
+}
+CORNERS_M = np.array([[0.0, 0.0, 0.0], [0.0, -0.35, 0.0], [0.0, -0.35, 0.35], [0.0, 0.0, 0.0]])
+SPEED_M_S = 0.3
+TELL_S = 0.02
+BEHIND_S = 0.08
+"""The hand follows its handle so much later."""
+RECOGNIZED = 0.95
+DEMONSTRATIONS = 3
+TRAINED_S = 40.0
+
+
+class Scripted:
+    """Whoever holds the handle: goes round once, and says with labels what that was."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell, bus = cell, cell.bus
+        self._handles = bus.publisher(Handle, bus.keys.handle)
+        self._labels = bus.publisher(Label, bus.keys.label)
+        self.steps: list[Received[Step]] = []
+        bus.subscribe(Step, bus.keys.step, self.steps.append)
+
+    def perform(self, rng: np.random.Generator, *, label: bool) -> dict[int, str]:
+        """Go round once; return the state that is meant at each step."""
+        corners = CORNERS_M * rng.uniform(0.95, 1.05) + np.array([0.6, 0.1, 0.4])
+        sides_m = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+        ends_s = np.cumsum(sides_m) / SPEED_M_S
+        first, begins, turns = len(self.steps), [], [0.0, *ends_s[:-1] + BEHIND_S]
+        began_s = time.monotonic()
+        self._tell(corners[0], held=False)
+        while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S:
+            while len(begins) < len(STATES) and at_s >= turns[len(begins)]:
+                if label:
+                    self._label(STATES[len(begins)])
+                begins.append(self._next)
+            share = [np.interp(at_s, [0.0, *ends_s], axis) for axis in corners.T]
+            self._tell(np.array(share), held=True)
+            self._cell.stack.elapse(TELL_S)
+        self._tell(corners[-1], held=False)
+        if label:
+            self._label("")
+        # What has been made meanwhile is still on its way.
+        self._cell.stack.elapse(0.2)
+        made = [step.body.index for step in self.steps[first:]]
+        return {index: STATES[bisect_right(begins, index) - 1] for index in made}
+
+    @property
+    def _next(self) -> int:
+        return self.steps[-1].body.index + 1 if self.steps else 0
+
+    def _tell(self, position: NDArray[np.float64], *, held: bool) -> None:
+        self._handles.put(Handle(operator="script", position=position, dead_man=held))
+
+    def _label(self, state: str) -> None:
+        clock = self.steps[-1].envelope.source.boot if self.steps else ""
+        self._labels.put(Label(state=state, clock=clock, step=self._next))
+
+
+def start(stack: Stack, task: Path, folder: Path) -> Cell:
+    """Bring up whoever it takes; the robot is left out, nothing here moves it."""
+    trainer = stack._spawn(
+        *("trainer", "trainer", "hmcs_trainer", "serve", "--router", stack.endpoint),
+        *("--cell", CELL, "--instance", "trainer", "--folder", str(folder / "models")),
+    )
+    cell = Cell(
+        stack,
+        ("input_device", "--source", "page", "--task", task),
+        ("recorder", "--folder", folder, "--no-autostart", "--free-mb", 0),
+        ("recognizer",),
+        ("fixture_controller",),
+        task=task,
+    )
+    stack.until_ready(trainer)
+    return cell
+
+
+def test_what_is_shown_three_times_is_recognized_the_fourth(
+    browser: Any, stack: Stack, open_viewer: OpenViewer, tmp_path: Path
+) -> None:
+    del browser
+    task = tmp_path / "triangle.yaml"
+    task.write_text(yaml.safe_dump(TASK), encoding="utf-8")
+    cell = start(stack, task, tmp_path / "taught")
+    viewer = open_viewer(cell, task=task)
+    hand, rng = Scripted(cell), np.random.default_rng(7)
+    beliefs: dict[int, Belief] = {}
+    followed: list[str] = []
+    cell.bus.subscribe(
+        Belief,
+        cell.bus.keys.belief("taught"),
+        lambda got: beliefs.update({got.body.step: got.body}),
+    )
+    cell.bus.subscribe(
+        FixtureState, cell.bus.keys.fixture_state, lambda got: followed.append(got.body.model)
+    )
+    viewer.open_tab("Teach")
+    files = []
+    for number in range(DEMONSTRATIONS):
+        viewer.write("Name", f"show-{number}")
+        viewer.press("Begin")
+        file = tmp_path / "taught" / f"show-{number}.mcap"
+        viewer.until(lambda file=file: viewer.sees(f"recording to {file}"))
+        hand.perform(rng, label=True)
+        viewer.press("End")
+        viewer.until(lambda file=file: viewer.sees(f"ended {file}"))
+        files.append(file)
+    viewer.write("Task", str(task))
+    viewer.write("Demonstrations", ", ".join(map(str, files)))
+    viewer.press("Train")
+    viewer.until(lambda: viewer.sees("done:"), within_s=TRAINED_S)
+    viewer.press("Activate what was trained")
+    viewer.until(lambda: active(cell))
+    meant = hand.perform(rng, label=False)
+    stack.until(lambda: set(meant) <= set(beliefs))
+    right = [beliefs[step].likely_state == state for step, state in meant.items()]
+    print(f"recognized {np.mean(right):.1%} of {len(right)} steps")
+    assert len(right) > 60
+    assert np.mean(right) >= RECOGNIZED
+    assert followed[-1] == "taught"
+
+
+def active(cell: Cell) -> bool:
+    """Whether the fixture follows what was taught."""
+    return cell.describe("fixture_controller", "fixture_controller")["active_model"] == "taught"

@@ -1,0 +1,247 @@
+"""A page of the console in a browser: where things are on it, and hands for its handle."""
+
+from __future__ import annotations
+
+import io
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from hmcs.bus.keys import Member
+from hmcs.bus.mailbox import Arrival
+from hmcs.bus.messages import Ask, Description, Handle, RobotState
+from hmcs.bus.session import Bus
+from hmcs.bus.wire import decode
+from hmcs.task import load_task
+from support.stack import Stack
+
+TASK = "human-shapes"
+SIZE = (800, 600)
+"""The panel stands on the right of it and leaves the middle free."""
+COARSE = 0.5
+"""Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
+hardware."""
+PICTURES = Path(__file__).parents[2] / "out" / "browser"
+PAGE_S = 20.0
+"""A page without graphics hardware takes its time to be there."""
+MANY_COLORS = 300
+GRIP_M = 0.13
+"""Where an arrow of the handle is held, from its foot."""
+UP = np.array([0.0, 0.0, 1.0])
+
+SLOW = ("--rate-hz", 5, "--lease-s", 1.0)
+"""A page without graphics hardware draws few frames a second, and answers as seldom."""
+
+_FIELD_OF_VIEW = np.radians(75.0)
+_CAMERA_FROM_START_M = (0.6, -0.8, 0.5)
+_GRAB_S = 2.0
+_DRAG_S = 30.0
+_LOOK_S = 0.05
+
+
+class Heard:
+    """What handles and robot have told, every message with its time of arrival."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.handles: list[tuple[int, Handle]] = []
+        """Each with its monotonic ns."""
+        self.robot: list[tuple[int, RobotState]] = []
+        bus.listen(bus.keys.handle, self._on_handle)
+        bus.listen(bus.keys.robot_state, self._on_robot)
+
+    @property
+    def tool(self) -> NDArray[np.float64]:
+        """Where the tool is now, m, shape (3,)."""
+        return self.robot[-1][1].tool_position
+
+    @property
+    def speed(self) -> float:
+        """Of the tool now, m/s."""
+        return speed_of(self.robot[-1][1])
+
+    @property
+    def operator(self) -> str:
+        """Who holds the handle now; empty while nobody does."""
+        return self.handles[-1][1].operator if self.held else ""
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody holds the handle now."""
+        return bool(self.handles) and self.handles[-1][1].dead_man
+
+    def _on_handle(self, arrival: Arrival) -> None:
+        self.handles.append((arrival.received_ns, decode(arrival.payload, Handle)[1]))
+
+    def _on_robot(self, arrival: Arrival) -> None:
+        self.robot.append((arrival.received_ns, decode(arrival.payload, RobotState)[1]))
+
+
+class Cell:
+    """A console and whoever it shall be with, and somebody who listens to them."""
+
+    def __init__(self, stack: Stack, *others: tuple[Any, ...], task: str | Path = TASK) -> None:
+        """Bring up a console; `others` are services with their flags."""
+        self.stack = stack
+        self.bus = stack.open_bus("observer", "o")
+        stack.watch(self.bus)
+        self.heard = Heard(self.bus)
+        console = stack.start("console", "page", "--port", 0, "--task", task, *SLOW)
+        rest = [stack.start(name, name, *flags) for name, *flags in others]
+        stack.until_ready(console, *rest)
+        self.url = self.describe("console", "page")["page"]
+
+    def describe(self, service: str, instance: str) -> dict[str, str]:
+        """Return the facts a process tells of itself."""
+        key = self.bus.keys.rpc(service, instance, "describe")
+        (answer,) = self.bus.ask(key, Ask(), Description, timeout_s=5.0)
+        return answer.body.facts
+
+    def is_there(self, service: str, instance: str) -> bool:
+        """Whether a process has told that it is ready."""
+        return Member(service, instance) in self.stack.present
+
+
+class Viewer:
+    """One page, its camera where it is put at the beginning."""
+
+    def __init__(self, browser: Any, cell: Cell, task: str | Path = TASK) -> None:
+        """Open the page and wait until it is drawn."""
+        self.cell = cell
+        self.requests: list[str] = []
+        """Whatever it has asked for, addresses of sockets among it."""
+        self._context = browser.new_context(
+            viewport={"width": SIZE[0], "height": SIZE[1]}, device_scale_factor=COARSE
+        )
+        self.page = self._context.new_page()
+        self.page.set_default_timeout(PAGE_S * 1e3)
+        self._context.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("websocket", lambda socket: self.requests.append(socket.url))
+        self._start_m = np.array(load_task(task).robot.tool_start_m)
+        self.page.goto(cell.url)
+        self.until(lambda: self.page.locator("canvas").count() > 0, within_s=PAGE_S)
+        self.until(lambda: self.colors() >= MANY_COLORS, within_s=PAGE_S)
+
+    # --- looking ----------------------------------------------------------------------------------
+
+    def until(self, condition: Callable[[], Any], within_s: float = PAGE_S) -> Any:
+        """Look at the page, and pump the bus, until `condition` is true; return what it gave."""
+        deadline_s = time.monotonic() + within_s
+        while not (value := condition()):
+            assert time.monotonic() < deadline_s, f"not on the page within {within_s:g} s"
+            self.cell.stack.elapse(_LOOK_S)
+        return value
+
+    def sees(self, text: str) -> bool:
+        """Whether a text can be read on the page now."""
+        found = self.page.get_by_text(text)
+        return any(found.nth(k).is_visible() for k in range(found.count()))
+
+    def picture(self, of: Any = None) -> NDArray[np.uint8]:
+        """Return what is on the page, or one element of it, shape (height, width, 3)."""
+        data = (of or self.page).screenshot(animations="allow")
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+    def colors(self) -> int:
+        """Return how many colors there are on the left half, where no panel stands."""
+        whole = self.picture()
+        return len(np.unique(whole[:, : whole.shape[1] // 2].reshape(-1, 3), axis=0))
+
+    def keep_picture(self, name: str) -> None:
+        """Write down how the page looks now."""
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=PICTURES / f"{name}.png")
+
+    def place_of(self, point: ArrayLike) -> tuple[float, float]:
+        """Return where a point, m, base frame, stands on the page, px."""
+        eye = self._start_m + _CAMERA_FROM_START_M
+        ahead = (self._start_m - eye) / np.linalg.norm(self._start_m - eye)
+        right = np.cross(ahead, UP)
+        right /= np.linalg.norm(right)
+        above = np.cross(right, ahead)
+        ray = np.asarray(point, dtype=float) - eye
+        px = SIZE[1] / 2 / np.tan(_FIELD_OF_VIEW / 2) / float(ray @ ahead)
+        return SIZE[0] / 2 + px * float(ray @ right), SIZE[1] / 2 - px * float(ray @ above)
+
+    # --- doing ------------------------------------------------------------------------------------
+
+    def open_tab(self, name: str) -> None:
+        """Turn to a tab of the panel."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def press(self, name: str) -> None:
+        """Click a button."""
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def write(self, label: str, text: str) -> None:
+        """Write into a field."""
+        words = self.page.locator("label").filter(has_text=re.compile(f"^{label}$"), visible=True)
+        # The label is not tied to its field.
+        words.locator("xpath=ancestor::div[.//input][1]//input").fill(text)
+
+    def reach_for_handle(self) -> NDArray[np.float64]:
+        """Press the mouse on the upward arrow of the handle; return where the handle's foot is."""
+        # Without anybody on the handle it stands at the tool.
+        foot = self.cell.heard.tool.copy()
+        self.page.mouse.move(*self.place_of(foot + (GRIP_M - 0.01) * UP))
+        self.page.mouse.move(*self.place_of(foot + GRIP_M * UP))
+        self.page.mouse.down()
+        return foot
+
+    def grab(self) -> NDArray[np.float64]:
+        """Take hold of the handle, with another try where it is not drawn yet; return its foot."""
+        heard, deadline_s = self.cell.heard, time.monotonic() + PAGE_S
+        while True:
+            foot = self.reach_for_handle()
+            until_s = time.monotonic() + _GRAB_S
+            while time.monotonic() < until_s:
+                self.cell.stack.pump()
+                if heard.held:
+                    return foot
+            self.page.mouse.up()
+            assert time.monotonic() < deadline_s, "the handle cannot be grabbed"
+
+    def lift_to(self, foot: NDArray[np.float64], height_m: float) -> None:
+        """Move the mouse so that the held handle stands so far above where its foot was."""
+        self.page.mouse.move(*self.place_of(foot + (GRIP_M + height_m) * UP))
+
+    def drag(
+        self, condition: Callable[[], Any], height_m: float, moves: int
+    ) -> NDArray[np.float64]:
+        """Lift the handle in so many moves until `condition` is true; return where its foot was.
+
+        On a machine that is busy a page may be silent for so long that it counts as having let go:
+        then the handle is grabbed anew, as its operator would.
+        """
+        stack, deadline_s = self.cell.stack, time.monotonic() + _DRAG_S
+        while True:
+            foot = self.grab()
+            for share in np.linspace(0.0, 1.0, moves + 1)[1:]:
+                self.lift_to(foot, share * height_m)
+                stack.elapse(_LOOK_S)
+            until_s = time.monotonic() + _GRAB_S
+            while time.monotonic() < until_s:
+                if condition():
+                    return foot
+                stack.pump()
+            assert time.monotonic() < deadline_s, "dragging the handle has not the effect"
+            self.let_go()
+            stack.until(lambda: not self.cell.heard.held)
+
+    def let_go(self) -> None:
+        """Release the mouse."""
+        self.page.mouse.up()
+
+    def close(self) -> None:
+        """Close the page; a second time does nothing."""
+        self._context.close()
+
+
+def speed_of(robot: RobotState) -> float:
+    """Return the speed of the tool, m/s."""
+    return float(np.linalg.norm(robot.tool_twist[:3]))
