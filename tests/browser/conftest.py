@@ -68,8 +68,10 @@ def open_viewer(browser: Any, request: pytest.FixtureRequest) -> Iterator[OpenVi
     viewers: list[Viewer] = []
 
     def open_one(cell: Cell, **settings: Any) -> Viewer:
-        viewers.append(Viewer(browser, cell, **settings))
-        return viewers[-1]
+        viewer = Viewer(browser, cell, **settings)
+        viewers.append(viewer)
+        viewer.open()
+        return viewer
 
     yield open_one
     name = re.sub(r"\W+", "-", request.node.name)

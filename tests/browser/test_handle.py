@@ -93,7 +93,6 @@ def test_a_page_closed_in_mid_motion_lets_the_robot_stand_in_time(
         print(f"{what} {(at_ns - asked_ns) * 1e-6:.0f} ms after it was asked for")
     assert speed_of(before) > MOVING_M_S, "the robot stood before: nothing is shown"
     assert released_ns < stood_ns
-    # How long a browser takes to close a page is its own affair.
-    assert (stood_ns - max(asked_ns, min(closed_ns, released_ns))) * 1e-9 <= STANDS_WITHIN_S
-    assert (released_ns - closed_ns) * 1e-9 <= STANDS_WITHIN_S
+    # How long a browser takes to close a page is its own affair; it may tell late that it has.
+    assert (stood_ns - min(closed_ns, released_ns)) * 1e-9 <= STANDS_WITHIN_S
     assert heard.robot[-1][1].stop != "none"

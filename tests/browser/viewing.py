@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from hmcs.bus.keys import Member
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Ask, Description, Handle, RobotState
 from hmcs.bus.session import Bus
@@ -102,16 +101,12 @@ class Cell:
         (answer,) = self.bus.ask(key, Ask(), Description, timeout_s=5.0)
         return answer.body.facts
 
-    def is_there(self, service: str, instance: str) -> bool:
-        """Whether a process has told that it is ready."""
-        return Member(service, instance) in self.stack.present
-
 
 class Viewer:
     """One page, its camera where it is put at the beginning."""
 
     def __init__(self, browser: Any, cell: Cell, task: str | Path = TASK) -> None:
-        """Open the page and wait until it is drawn."""
+        """Begin with an empty page; `open` opens the console's."""
         self.cell = cell
         self.requests: list[str] = []
         """Whatever it has asked for, addresses of sockets among it."""
@@ -123,7 +118,10 @@ class Viewer:
         self._context.on("request", lambda request: self.requests.append(request.url))
         self.page.on("websocket", lambda socket: self.requests.append(socket.url))
         self._start_m = np.array(load_task(task).robot.tool_start_m)
-        self.page.goto(cell.url)
+
+    def open(self) -> None:
+        """Open the page and wait until it is drawn."""
+        self.page.goto(self.cell.url)
         self.until(lambda: self.page.locator("canvas").count() > 0, within_s=PAGE_S)
         self.until(lambda: self.colors() >= MANY_COLORS, within_s=PAGE_S)
 
