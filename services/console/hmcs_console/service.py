@@ -67,7 +67,9 @@ class Console(Service):
         self._labels = bus.publisher(Label, bus.keys.label)
         self._asking = Asking(bus)
         self._unwatched_until_s = 0.0
-        self._view = View(Guides(models), task, self, settings.lease_s, log)
+        # A trainer finds a task by what the console was told, a file's path or a shipped name.
+        taught = settings.task or ("" if task is None else task.name)
+        self._view = View(Guides(models), task, taught, self, settings.lease_s, log)
         token = settings.token.get_secret_value() if settings.token is not None else None
         try:
             self._gateway = Gateway(

@@ -27,6 +27,7 @@ class View:
         self,
         guides: Guides,
         task: Task | None,
+        taught: str,
         wishes: Wishes,
         lease_s: float,
         log: logging.Logger,
@@ -43,7 +44,7 @@ class View:
         if task is not None:
             draw_workspace(server.scene, task.workspace)
         self._scene = Scene(server, guides, log)
-        self._panel = Panel(server.gui, wishes, states, "" if task is None else task.name)
+        self._panel = Panel(server.gui, wishes, states, taught)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)
 
