@@ -52,7 +52,11 @@ def test_belief_reaches_the_robot_while_the_hand_moves(bus: Bus, pump_until: Pum
     assert guiding[0].body.state in beliefs[0].body.states
 
 
-def test_every_service_is_there_and_says_it_is_healthy(bus: Bus) -> None:
+def test_every_service_is_there_and_says_it_is_healthy(bus: Bus, pump_until: Pump) -> None:
+    keys = bus.keys
+    pump_until(
+        lambda: SERVICES <= {keys.member_of(key).service for key in bus.alive(keys.presence())}
+    )
     answers = bus.ask(bus.keys.rpc("*", "*", "health"), Ask(), Health, timeout_s=3.0)
     assert {answer.envelope.source.service for answer in answers} == SERVICES
     assert [answer.body.detail for answer in answers if not answer.body.healthy] == []
