@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import platform
 import signal
 import warnings
@@ -110,9 +111,16 @@ def _trial(
     settings: Settings,
     stream: np.random.SeedSequence,
 ) -> Sequence[Measured]:
+    leave_interrupts_to_parent()
     # With one thread sums are added up in the same order everywhere, and times compare.
     with threadpool_limits(1):
         return trial(settings, np.random.default_rng(stream))
+
+
+def leave_interrupts_to_parent() -> None:
+    """In a worker process: be deaf to Ctrl-C, which the process that started it sees to."""
+    if multiprocessing.current_process().name.startswith("LokyProcess"):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager

@@ -21,7 +21,11 @@ from hmcs_laboratory.figures.catalog import find_figures
 from hmcs_laboratory.figures.drawing import Files, Number, files_of, house_style
 from hmcs_laboratory.figures.figure import Figure
 from hmcs_laboratory.figures.page import page
-from hmcs_laboratory.running import _interrupts_kept_from_workers, versions
+from hmcs_laboratory.running import (
+    _interrupts_kept_from_workers,
+    leave_interrupts_to_parent,
+    versions,
+)
 from hmcs_laboratory.study import Study
 from hmcs_laboratory.summary import Row
 
@@ -114,6 +118,7 @@ def draw_study(study: Study[Any], rows: Sequence[Row], path: Path) -> None:
 
 def make(figure: Figure[Any], *, fast: bool, seed: int) -> Made:
     """Make one figure."""
+    leave_interrupts_to_parent()
     began_s = time.thread_time()
     settings = figure.chosen(fast=fast)
     # With one thread sums are added up in the same order everywhere.
