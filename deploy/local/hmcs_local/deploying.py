@@ -21,6 +21,7 @@ from hmcs.bus.session import Bus, Received
 from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
+from hmcs.whole_files import written_whole
 from hmcs_local import swap
 from hmcs_local.control import Control
 
@@ -83,10 +84,8 @@ def read_history(folder: Path) -> History:
 
 def write_history(folder: Path, history: History) -> None:
     """Write what was deployed, whole or not at all."""
-    file = _history_file(folder)
-    unfinished = file.with_name(f".{file.name}.part")
-    unfinished.write_text(history.model_dump_json(indent=2), encoding="utf-8")
-    unfinished.replace(file)
+    with written_whole(_history_file(folder)) as unfinished:
+        unfinished.write_text(history.model_dump_json(indent=2), encoding="utf-8")
 
 
 def deploy(
@@ -100,8 +99,8 @@ def deploy(
 ) -> Agreement:
     """Let a model's recognizer take over; return how it agreed with the one that was active.
 
-    Raises DeployError where it does not become ready or bears the name of the active one,
-    ModelFileError for its file, SwapError and ControlError as `hmcs swap` does.
+    Raises DeployError where it bears the name of the active one, ModelFileError for its file,
+    SwapError where it does not become ready, and ControlError as `hmcs swap` does.
     """
     model, history = load_model(file), read_history(folder)
     active = active_model(bus)
@@ -193,16 +192,10 @@ def _brought_up(
     command = [sys.executable, "-m", f"hmcs_{SERVICE}", "--model", str(file.resolve())]
     instance = control.start(SERVICE, command)
     tell(f"{instance} started with {model.name} {model.hash}, a shadow until it is ready")
-    deadline_s = time.monotonic() + READY_WITHIN_S
     member = bus.keys.member(model.name, SERVICE, instance)
-    while not bus.alive(member):
-        if time.monotonic() > deadline_s or not control.owns(instance):
-            control.stop(instance)
-            raise DeployError(
-                f"{instance} was not ready within {READY_WITHIN_S:g} s and was stopped; what was "
-                f"active goes on. Its log says why: {instance}.log"
-            )
-        bus.pump(_LOOK_EVERY_S)
+    swap.until_ready(
+        bus, control, instance, lambda: bool(bus.alive(member)), READY_WITHIN_S, "what was active"
+    )
     tell(f"{instance} has replayed and is ready")
     return instance
 

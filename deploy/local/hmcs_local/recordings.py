@@ -20,6 +20,7 @@ from hmcs.recordings.inspection import Inspection, inspected
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.recordings.replaying import Comparison, compared, kept_model, replayed, rows_of
+from hmcs.whole_files import written_whole
 
 
 def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
@@ -74,13 +75,14 @@ def replay_in_process(
         replay = replayed(content, chosen, _whole_percents(progress, task))
     comparison = compared(replay)
     if out is not None:
-        unfinished = out.with_name(f".{out.name}.part")
-        with unfinished.open("w", encoding="utf-8", newline="") as stream:
-            rows = list(rows_of(replay))
+        rows = list(rows_of(replay))
+        with (
+            written_whole(out) as unfinished,
+            unfinished.open("w", encoding="utf-8", newline="") as stream,
+        ):
             writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
-        unfinished.replace(out)
     if as_json:
         told = {"model": chosen.name, "model_hash": chosen.hash, **comparison._asdict()}
         told = {k: None if v != v else v for k, v in told.items()}

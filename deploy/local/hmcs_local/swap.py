@@ -78,19 +78,35 @@ def replace_classifier(
         )
     newcomer = control.start("gesteme-classifier", command)
     tell(f"{newcomer} started; {instance} goes on until it is ready")
-    deadline_s = time.monotonic() + ready_within_s
-    while newcomer not in _members(bus):
-        if time.monotonic() > deadline_s or not control.owns(newcomer):
-            control.stop(newcomer)
-            raise SwapError(
-                f"{newcomer} was not ready within {ready_within_s:g} s and was stopped; "
-                f"{instance} goes on. Its log says why: {newcomer}.log"
-            )
-        bus.pump(_LOOK_EVERY_S)
+    until_ready(bus, control, newcomer, lambda: newcomer in _members(bus), ready_within_s, instance)
     tell(f"{newcomer} has replayed and is ready")
     code = control.stop(instance)
     tell(f"{instance} stopped with exit code {code}")
     return newcomer
+
+
+def until_ready(
+    bus: Bus,
+    control: Control,
+    newcomer: str,
+    is_ready: Callable[[], bool],
+    within_s: float,
+    old: str,
+) -> None:
+    """Wait until a process that was started is ready.
+
+    Raises SwapError, which says that `old` goes on, where it ends or is not ready in time; it is
+    stopped then.
+    """
+    deadline_s = time.monotonic() + within_s
+    while not is_ready():
+        if time.monotonic() > deadline_s or not control.owns(newcomer):
+            control.stop(newcomer)
+            raise SwapError(
+                f"{newcomer} was not ready within {within_s:g} s and was stopped; "
+                f"{old} goes on. Its log says why: {newcomer}.log"
+            )
+        bus.pump(_LOOK_EVERY_S)
 
 
 def _members(bus: Bus) -> set[str]:

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.bus.service import UserError
-from hmcs.fixtures.volumes import Knot, Volume
+from hmcs.fixtures.rules import rules_of
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model_file import load_model, model_files
 from hmcs.task import Task, load_task
 from hmcs_console.geometry import Surface, tube
 
@@ -31,7 +30,7 @@ def load_models(places: Iterable[Path]) -> tuple[Model, ...]:
 
     Raises ModelFileError for a file that cannot be used, UserError for a folder without files.
     """
-    return tuple(load_model(file) for place in places for file in _files(place))
+    return tuple(load_model(file) for place in places for file in model_files(place))
 
 
 def task_of(name: str | None, models: tuple[Model, ...]) -> Task | None:
@@ -60,7 +59,7 @@ class Guides:
         if found is None or gesteme not in found.paths:
             return None
         path = found.paths[gesteme]
-        volume = _volume_of(found.task, state)
+        volume = rules_of(found.task).in_state(state).volume
         if volume is None:
             return Guide(path.points, None)
         progress = path.arc_length / path.length_m
@@ -70,23 +69,3 @@ class Guides:
             for share, spread in zip(progress, spreads, strict=True)
         ]
         return Guide(path.points, tube(path.points, radii))
-
-
-def _volume_of(task: Task, state: str) -> Volume | None:
-    own = {named.name: named.fixture for named in task.states}.get(state)
-    setup = task.fixture.volume if own is None or own.volume is None else own.volume
-    if setup is None:
-        return None
-    knots = tuple(Knot(knot.progress, knot.radius_m) for knot in setup.knots)
-    return Volume(knots, setup.wall_m, setup.of_spread)
-
-
-def _files(place: Path) -> list[Path]:
-    if not place.is_dir():
-        return [place]
-    files = sorted(place.glob("*.hmcs"))
-    if not files:
-        raise UserError(
-            f"{place}: no model file (*.hmcs) in this folder: make one with `hmcs train`"
-        )
-    return files

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 
-from hmcs.bus.settings import ServiceSettings
+from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
 from hmcs_console.admission import is_loopback
 
 
@@ -17,7 +18,9 @@ class ConsoleSettings(ServiceSettings):
     """Where the page is served; anything but a loopback address needs a token."""
     port: int = Field(default=8080, ge=0, le=65_535)
     """Of the page; the next free one where it is taken, any free one for 0."""
-    token: SecretStr | None = Field(default=None, min_length=8, validate_default=True)
+    token: Annotated[SecretStr | None, EMPTY_IS_NONE] = Field(
+        default=None, min_length=8, validate_default=True
+    )
     """Who opens the page with `?token=…` is let in; without one everybody on this machine is."""
     rate_hz: float = Field(default=30.0, ge=2, le=100)
     """How often the page is drawn at best."""
@@ -28,12 +31,6 @@ class ConsoleSettings(ServiceSettings):
     task: str | None = None
     """Name of a task that comes along, or a task file, whose workspace is drawn; the task of the
     first model by default."""
-
-    @field_validator("token", mode="before")
-    @classmethod
-    def _empty_is_none(cls, token: object) -> object:
-        """An environment variable that is set to nothing."""
-        return None if token == "" else token
 
     @field_validator("token")
     @classmethod

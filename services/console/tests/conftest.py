@@ -16,17 +16,12 @@ import pytest
 from hmcs.bus.messages import Handle, Label, RobotState
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
-from hmcs.recognition.exits import DEFAULT_WEIGHTS
-from hmcs.recognition.gestemes import GestemeParameters, Scoring
-from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
-from hmcs.recognition.segment_filter import FilterSettings
-from hmcs.recognition.senses import Senses
-from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
 from hmcs_console.service import Console
 from hmcs_console.settings import ConsoleSettings
+from support.made_up import line_model
 
 DEADLINE_S = 10.0
 LOG = logging.getLogger("test")
@@ -94,36 +89,7 @@ def task() -> Task:
 
 
 def model() -> Model:
-    phases = np.full((1, 2), 0.25)
-    return Model(
-        name="lines",
-        hash="",
-        task=task(),
-        recognizer="segment-filter",
-        knowledge=Layers(
-            GestemeParameters(
-                means=np.zeros((1, 2, 6)),
-                variances=np.ones((1, 2, 6)),
-                initial=np.array([[1.0, 0.0]]),
-                stay=phases,
-                advance=phases,
-                skip=phases,
-                remaining=phases,
-                variant=np.zeros((1, 2), dtype=np.int32),
-                ends=np.zeros((1, 1, 3)),
-                normals=np.zeros((1, 1, 3)),
-                exit_weights=DEFAULT_WEIGHTS,
-                step_m=0.01,
-                senses=Senses((), np.zeros((1, 2, 0)), np.ones((1, 2, 0)), np.zeros(0)),
-            ),
-            Scoring(0.0, 1.0, 100, 30.0),
-            FilterSettings(),
-            AlarmSettings(20, -5.0, -20.0),
-        ),
-        path_points=(np.array([[0.0, 0, 0], [0.25, 0, 0], [0.5, 0, 0]]),),
-        path_spreads=(np.full(3, 0.005),),
-        demonstrations=("made up",),
-    )
+    return line_model("lines", task(), np.array([[0.0, 0, 0], [0.25, 0, 0], [0.5, 0, 0]]))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hmcs.bus.service import UserError
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model_file import load_model, model_files
 
 
 def load_models(places: Iterable[Path]) -> dict[str, Model]:
@@ -18,7 +18,7 @@ def load_models(places: Iterable[Path]) -> dict[str, Model]:
     """
     models: dict[str, Model] = {}
     for place in places:
-        for file in _files(place):
+        for file in model_files(place):
             model = load_model(file)
             if models.setdefault(model.name, model).hash != model.hash:
                 raise UserError(
@@ -26,14 +26,3 @@ def load_models(places: Iterable[Path]) -> dict[str, Model]:
                     "out, or train it under another name"
                 )
     return models
-
-
-def _files(place: Path) -> list[Path]:
-    if not place.is_dir():
-        return [place]
-    files = sorted(place.glob("*.hmcs"))
-    if not files:
-        raise UserError(
-            f"{place}: no model file (*.hmcs) in this folder: make one with `hmcs train`"
-        )
-    return files

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from hmcs.bus.settings import ServiceSettings
+from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
 
 
 class RecognizerSettings(ServiceSettings):
     """What a recognizer in one process can be told."""
 
-    model: Path | None = None
+    model: Annotated[Path | None, EMPTY_IS_NONE] = None
     """The model file to begin with; the kind of recognizer stands in it. Without one it waits to be
     given one."""
     memory_steps: int = Field(default=300, ge=1, le=10_000)
     """How many of the last steps a newcomer replays before it is ready."""
-
-    @field_validator("model", mode="before")
-    @classmethod
-    def _empty_is_none(cls, model: object) -> object:
-        """An environment variable that is set to nothing."""
-        return None if model == "" else model

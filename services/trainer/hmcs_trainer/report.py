@@ -14,6 +14,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from hmcs.recognition.model import Model
+from hmcs.whole_files import written_whole
 from hmcs_trainer.judging import Judgment
 from hmcs_trainer.validation import Finding
 
@@ -70,9 +71,8 @@ def write_report(
         confusion=_svg(_confusion(model, judgment)),
         guides=_svg(_guides(model)),
     )
-    unfinished = path.with_name(f".{path.name}.part")
-    unfinished.write_text(page, encoding="utf-8")
-    unfinished.replace(path)
+    with written_whole(path) as unfinished:
+        unfinished.write_text(page, encoding="utf-8")
 
 
 def numbers(judgment: Judgment) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, NoReturn, TypeVar
 
 import pydantic_settings
 import yaml
-from pydantic import Field, ValidationError, field_validator
+from pydantic import BeforeValidator, Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, CliSettingsSource, EnvSettingsSource, SettingsConfigDict
 
 from hmcs.bus.config import DEFAULT_ROUTER, BusSettings, check_endpoint
@@ -18,6 +18,11 @@ from hmcs.bus.keys import check_name
 from hmcs.errors import UserError
 
 ENVIRONMENT_PREFIX = "HMCS_"
+
+
+EMPTY_IS_NONE = BeforeValidator(lambda value: None if value == "" else value)
+"""Of a setting that may be left out: an environment variable that is set to nothing sets nothing.
+"""
 
 
 class SettingsError(UserError):

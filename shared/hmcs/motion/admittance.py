@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.motion.dead_band import beyond
+
 FloatArray = NDArray[np.float64]
 
 
@@ -36,8 +38,8 @@ class Admittance:
         """Return the velocity, m/s and rad/s, that a force and torque ask for, shapes (6,)."""
         return np.concatenate(
             [
-                self.m_s_per_n * _beyond(wrench[:3], self.force_threshold_n),
-                self.rad_s_per_n_m * _beyond(wrench[3:], self.torque_threshold_n_m),
+                self.m_s_per_n * beyond(wrench[:3], self.force_threshold_n),
+                self.rad_s_per_n_m * beyond(wrench[3:], self.torque_threshold_n_m),
             ]
         )
 
@@ -49,11 +51,6 @@ class Admittance:
                 _raised(twist[3:] / self.rad_s_per_n_m, self.torque_threshold_n_m),
             ]
         )
-
-
-def _beyond(vector: FloatArray, threshold: float) -> FloatArray:
-    length = float(np.linalg.norm(vector))
-    return np.asarray(vector * max(1.0 - threshold / length, 0.0)) if length > 0 else vector
 
 
 def _raised(vector: FloatArray, threshold: float) -> FloatArray:

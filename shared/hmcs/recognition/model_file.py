@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from hmcs.recognition.content import AnyArray, Content, ContentError, put_togeth
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import kind_named
 from hmcs.task import Task
+from hmcs.whole_files import written_whole
 
 FORMAT = "hmcs-model/1"
 
@@ -59,20 +59,33 @@ def save_model(model: Model, path: str | Path) -> Model:
     model = with_hash(model)
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
-            manifest, arrays = _parts(model)
-            text = json.dumps(manifest, indent=2, sort_keys=True)
-            archive.writestr(zipfile.ZipInfo(_MANIFEST, _EPOCH), text)
-            for name, array in arrays.items():
-                buffer = io.BytesIO()
-                np.save(buffer, array, allow_pickle=False)
-                archive.writestr(zipfile.ZipInfo(f"{_ARRAYS}{name}.npy", _EPOCH), buffer.getvalue())
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with (
+        written_whole(target) as unfinished,
+        zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        manifest, arrays = _parts(model)
+        text = json.dumps(manifest, indent=2, sort_keys=True)
+        archive.writestr(zipfile.ZipInfo(_MANIFEST, _EPOCH), text)
+        for name, array in arrays.items():
+            buffer = io.BytesIO()
+            np.save(buffer, array, allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{_ARRAYS}{name}.npy", _EPOCH), buffer.getvalue())
     return model
+
+
+def model_files(place: Path) -> list[Path]:
+    """Return a model file, or those of a folder of `*.hmcs` files by name.
+
+    Raises UserError for a folder without any.
+    """
+    if not place.is_dir():
+        return [place]
+    files = sorted(place.glob("*.hmcs"))
+    if not files:
+        raise UserError(
+            f"{place}: no model file (*.hmcs) in this folder: make one with `hmcs train`"
+        )
+    return files
 
 
 def load_model(path: str | Path) -> Model:

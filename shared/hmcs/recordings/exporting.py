@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hmcs.recordings.reading import Recorded, RecordingContent
+from hmcs.whole_files import written_whole
 
 Format = Literal["csv", "npz"]
 _ENVELOPE = ("schema",)
@@ -36,13 +37,11 @@ def export(content: RecordingContent, folder: Path, form: Format) -> list[Path]:
         ]
         columns = list(dict.fromkeys(name for row in rows for name in row))
         target = folder / f"{_file_name(key)}.{form}"
-        unfinished = target.with_name(f".{target.name}")
-        if form == "csv":
-            _write_csv(unfinished, columns, rows)
-        else:
-            with unfinished.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **_arrays(columns, rows))
-        unfinished.replace(target)
+        with written_whole(target) as unfinished:
+            if form == "csv":
+                _write_csv(unfinished, columns, rows)
+            else:
+                _write_arrays(unfinished, columns, rows)
         written.append(target)
     return written
 
@@ -69,6 +68,11 @@ def _write_csv(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, A
         writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+
+
+def _write_arrays(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, **_arrays(columns, rows))
 
 
 def _arrays(

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from hmcs.bus.messages import Label, Step
 from hmcs.recordings.reading import RecordingContent, RecordingError
+from hmcs.whole_files import written_whole
 
 HEADER = ["begin_s", "end_s", "state"]
 
@@ -84,14 +85,15 @@ def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
 
 def write_labels(file: Path, stretches: Sequence[Stretch], first_ns: int) -> None:
     """Write labels as `read_labels` reads them, whole or not at all."""
-    unfinished = file.with_name(f".{file.name}.part")
-    with unfinished.open("w", encoding="utf-8", newline="") as stream:
+    with (
+        written_whole(file) as unfinished,
+        unfinished.open("w", encoding="utf-8", newline="") as stream,
+    ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(HEADER)
         for stretch in stretches:
             begin_s, end_s = ((at - first_ns) / 1e9 for at in stretch[:2])
             writer.writerow([f"{begin_s:.6f}", f"{end_s:.6f}", stretch.state])
-    unfinished.replace(file)
 
 
 def _said(content: RecordingContent) -> tuple[Stretch, ...]:
