@@ -15,9 +15,12 @@ from hmcs.bus.messages import (
     LastStepsQuestion,
     LoadModel,
     Motion,
+    Outline,
+    OutlineQuestion,
     Record,
     Refusal,
     RobotLooks,
+    SetLabels,
     SettingsReport,
     Step,
     Train,
@@ -26,7 +29,7 @@ from hmcs.bus.qos import STANCES, Stance
 
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
-    ActivateRecognizer, RobotLooks, Record, Train, Done,
+    ActivateRecognizer, RobotLooks, Record, Train, OutlineQuestion, Outline, SetLabels, Done,
 }  # fmt: skip
 
 

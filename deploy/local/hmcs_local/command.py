@@ -307,6 +307,17 @@ def mark(
 
 
 @app.command()
+def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+    """Let the robot stand, whoever drives it, until its operator lets go and takes hold again."""
+    from hmcs.bus.messages import Ask
+    from hmcs_local.asking import asked_of
+    from hmcs_local.observer import open_observer
+
+    with open_observer(router, cell) as bus:
+        typer.echo(asked_of(bus, "robot", "stop", Ask()))
+
+
+@app.command()
 def inspect(
     recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from hmcs.bus.messages import Ask, Command, Origin, RobotLooks, RobotState
+from hmcs.bus.messages import Ask, Command, Done, Origin, RobotLooks, RobotState
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.task import load_task
@@ -19,7 +19,7 @@ from hmcs_robot.control import Motion, Standing, follow, stand
 from hmcs_robot.driver import ArmDriver, ArmState
 from hmcs_robot.set_up import limits_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings
-from hmcs_robot.supervision import Order, Policy, Stop, Supervision, accept, tick
+from hmcs_robot.supervision import Order, Policy, Stop, Supervision, accept, stopped, tick
 
 _NS_PER_S = 1_000_000_000
 
@@ -59,6 +59,7 @@ class Robot(Service):
         """Listen and begin to move."""
         self._done_ns = time.monotonic_ns()
         self.bus.answer("looks", Ask, self._looks)
+        self.bus.answer("stop", Ask, self._stop)
         self.bus.subscribe(Command, self.bus.keys.command, self._on_command)
         self.bus.every(self._period_ns / _NS_PER_S, self._on_tick)
 
@@ -82,6 +83,12 @@ class Robot(Service):
 
     def _looks(self, _: Ask) -> RobotLooks:
         return RobotLooks(robot=self._driver.name, **self._driver.looks()._asdict())
+
+    def _stop(self, _: Ask) -> Done:
+        before = self._supervision.stop
+        self._supervision = stopped(self._supervision)
+        self._log_change(before)
+        return Done(detail="stands until the operator lets go and takes hold again")
 
     def _on_command(self, received: Received[Command]) -> None:
         command = received.body

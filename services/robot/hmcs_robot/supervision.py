@@ -27,8 +27,9 @@ Stop = Literal[
     "refused_command",
     "second_writer",
     "collision",
+    "asked",
 ]
-_LASTING: tuple[Stop, ...] = ("stale_command", "refused_command", "collision")
+_LASTING: tuple[Stop, ...] = ("stale_command", "refused_command", "collision", "asked")
 """Stops that stay the reason when the commands go stale."""
 Verdict = Literal["accepted", "second_writer", "late"]
 
@@ -119,6 +120,11 @@ def tick(
     if now.stop == "none" and set(contacts) - set(now.contacts):
         now = _halt(now, "collision")
     return replace(now, contacts=contacts, ticked_ns=time_ns)
+
+
+def stopped(now: Supervision) -> Supervision:
+    """Return the supervision after somebody asked for a stop."""
+    return _halt(now, "asked")
 
 
 def _after_hang(now: Supervision, time_ns: int, policy: Policy) -> Supervision:

@@ -10,13 +10,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hmcs.bus.config import BusSettings
-from hmcs.bus.messages import Command, Origin, RobotState
+from hmcs.bus.keys import ANY
+from hmcs.bus.messages import Ask, Command, Done, Origin, RobotState
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, Publisher, Received
 from hmcs_robot.service import Robot
@@ -168,6 +170,19 @@ def test_a_second_writer_is_refused_and_counted(cell: Cell) -> None:
     cell.until(lambda s: s.tool_position[1] < -0.02, in_turns)
     assert cell.bus.counters.refused["command"] > 0
     assert all(state.stop == "none" for state in cell.said)
+
+
+def test_it_stops_when_asked_and_follows_again_after_a_new_engage(cell: Cell) -> None:
+    cell.engage(-0.1)
+    asker = cell.open("asker")
+    key = asker.keys.rpc("robot", ANY, "stop")
+    with ThreadPoolExecutor(1) as beside:
+        answers = beside.submit(asker.ask, key, Ask(), Done, DEADLINE_S)
+        cell.until(lambda s: s.stop == "asked", lambda: cell.say(True, -0.1))
+    assert "takes hold again" in answers.result()[0].body.detail
+    cell.until(lambda s: np.abs(s.joint_velocities).max() < 1e-3, lambda: cell.say(True, -0.1))
+    assert cell.said[-1].stop == "asked"
+    cell.engage(-0.1)
 
 
 def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs_robot.supervision import Order, Policy, Supervision, Verdict, accept, tick
+from hmcs_robot.supervision import Order, Policy, Supervision, Verdict, accept, stopped, tick
 
 MS = 1_000_000
 POLICY = Policy(hang_ns=100 * MS, settle_ns=250 * MS)
@@ -131,6 +131,20 @@ def test_a_collision_stays_the_reason_when_the_commands_end() -> None:
     story.tick(1, "post")
     story.tick(90, "post")
     assert story.tick(180, "post") == "collision"
+
+
+def test_whoever_asks_stops_it_until_the_operator_lets_go_and_takes_hold_again() -> None:
+    story = Story()
+    story.engage()
+    story.now = stopped(story.now)
+    assert story.tick(1) == "asked"
+    assert not story.now.twist.any()
+    story.order(50, True)
+    assert story.tick(90) == "asked"
+    assert story.tick(180) == "asked"
+    story.order(190, False)
+    story.order(200, True)
+    assert story.tick(201) == "none"
 
 
 def test_a_hang_of_its_own_stops_and_refuses_what_queued_up() -> None:

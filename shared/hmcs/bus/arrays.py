@@ -131,6 +131,8 @@ Vector6 = Annotated[NDArray[np.float64], ArraySpec((6,))]
 """A twist or a wrench: linear x, y, z, then angular x, y, z."""
 Floats = Annotated[NDArray[np.float64], ArraySpec((None,))]
 """Any number of float64."""
+Points = Annotated[NDArray[np.float64], ArraySpec((None, 3))]
+"""Any number of points, each along x, y, z."""
 EvidenceFloats = Annotated[NDArray[Any], ArraySpec((None,), ("<f4", "<f8"))]
 """Any number of float32, or of float64 where the sender was set to it."""
 Indices = Annotated[NDArray[np.int32], ArraySpec((None,), ("<i4",))]

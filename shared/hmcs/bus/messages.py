@@ -24,6 +24,7 @@ from hmcs.bus.arrays import (
     EvidenceFloats,
     Floats,
     Indices,
+    Points,
     Quaternion,
     Vector3,
     Vector6,
@@ -196,6 +197,7 @@ class RobotState(Message):
     """Where the robot is and what it touches."""
 
     SCHEMA = "robot_state"
+    VERSION = 2
 
     robot: Name
     """Which robot, e.g. `puma560`."""
@@ -225,8 +227,10 @@ class RobotState(Message):
         "refused_command",
         "second_writer",
         "collision",
+        "asked",
     ]
-    """Why the robot stands; `none` while it follows commands."""
+    """Why the robot stands; `none` while it follows commands, `asked` after somebody asked it to
+    `stop`."""
     limited: tuple[str, ...]
     """Limits that shape the motion now, e.g. `speed`, `workspace`, `joint_3`, `singularity`."""
 
@@ -500,6 +504,7 @@ class Train(Message):
     """Asks the trainer to learn a model from recordings or demonstrations."""
 
     SCHEMA = "train"
+    VERSION = 2
 
     model: Name
     """What it is to be called."""
@@ -509,6 +514,58 @@ class Train(Message):
     """Recordings and CSV files, as the trainer sees them."""
     recognizer: str = ""
     """Kind of recognizer; the default one where it is empty."""
+    find_states: bool = False
+    """True has gestemes and states found in the motion itself, whatever labels it has: they are
+    written as labels beside the recordings, and as a task of their own beside the model."""
+
+
+class OutlineQuestion(Message):
+    """Asks the recorder for the motion in a recording, to set labels by."""
+
+    SCHEMA = "outline_question"
+
+    recording: str = ""
+    """Name of the file, without folder; the newest one where it is empty."""
+
+
+class Outline(Message):
+    """The motion in a recording, and which part of the task it was."""
+
+    SCHEMA = "outline"
+
+    recordings: tuple[str, ...]
+    """Names of all files in the folder, the newest first."""
+    recording: str
+    """Name of the file this is the outline of."""
+    path: str
+    """Of that file, as the recorder sees it."""
+    duration_s: Annotated[float, Field(ge=0)]
+    """From its first message to its last."""
+    time_s: Floats
+    """Since its first message, rising, shape (n,)."""
+    position: Points
+    """Of the hand, m, operator frame, shape (n, 3)."""
+    begin_s: Floats
+    """Where each label begins, s since the first message, shape (m,)."""
+    end_s: Floats
+    """Where it ends, shape (m,)."""
+    states: tuple[str, ...]
+    """What it says, as in Label, m of them."""
+
+
+class SetLabels(Message):
+    """Asks the recorder to write labels beside a recording, instead of those there are."""
+
+    SCHEMA = "set_labels"
+
+    recording: str
+    """Name of the file, without folder."""
+    begin_s: Floats
+    """Where each label begins, s since the recording's first message, shape (m,)."""
+    end_s: Floats
+    """Where it ends, shape (m,)."""
+    states: tuple[str, ...]
+    """What it says, as in Label, m of them."""
 
 
 class Done(Message):
@@ -543,6 +600,9 @@ MESSAGES: tuple[type[Message], ...] = (
     RobotLooks,
     Record,
     Train,
+    OutlineQuestion,
+    Outline,
+    SetLabels,
     Done,
 )
 """Every message there is, for schemas, golden bytes and tables."""
