@@ -10,6 +10,8 @@ from hmcs.fixtures.rules import rules_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.fixtures.workspace import regions_of
 from hmcs.motion.steps import Step
+from hmcs.recognition.gestemes import StepEvidence
+from hmcs.recognition.layered import Precision
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 
@@ -35,6 +37,23 @@ def belief_message(model: Model, recognition: Recognition, clock: str) -> messag
         mean_log_likelihood=recognition.mean_log_likelihood,
         unknown_alarm=recognition.unknown_alarm,
         missing_gestemes=tuple(model.gesteme_names[g] for g in belief.missing),
+    )
+
+
+def evidence_message(
+    model: Model, evidence: StepEvidence, clock: str, precision: Precision
+) -> messages.Evidence:
+    """Return what is told of the evidence; `clock` is the boot of the input device."""
+    names = model.gesteme_names
+    return messages.Evidence(
+        model_hash=model.hash,
+        clock=clock,
+        step=evidence.step,
+        gestemes=tuple(names[g] for g in evidence.gestemes),
+        pair_gesteme=np.searchsorted(evidence.gestemes, evidence.pair_gesteme).astype(np.int32),
+        pair_start=evidence.pair_start,
+        exit=evidence.exit.astype(precision),
+        log_ratio=evidence.log_ratio.astype(precision),
     )
 
 

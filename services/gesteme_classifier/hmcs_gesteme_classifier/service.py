@@ -6,16 +6,13 @@ import logging
 import time
 from collections import deque
 
-import numpy as np
-
 from hmcs.bus.messages import Evidence
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
-from hmcs.recognition.gestemes import StepEvidence
 from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
-from hmcs.translation import step_of
+from hmcs.translation import evidence_message, step_of
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
 from hmcs_gesteme_classifier.shares import share_of
 
@@ -29,12 +26,12 @@ class GestemeClassifier(Service):
 
     name = "gesteme_classifier"
     Settings = GestemeClassifierSettings
+    settings: GestemeClassifierSettings
 
     def __init__(self, settings: GestemeClassifierSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._model = load_model(settings.model)
         self._named = _named(settings.gestemes, self._model.gesteme_names, settings.model)
-        self._dtype = np.dtype(settings.precision)
         self._evidence = bus.publisher(
             Evidence, bus.keys.evidence(self._model.name, bus.source.instance)
         )
@@ -87,7 +84,8 @@ class GestemeClassifier(Service):
         self._recent.append(fed)
         evidence = self._bank.step(step_of(fed.step))
         if self._ready:
-            self._evidence.put(self._message(evidence, fed.clock), fed.origin)
+            told = evidence_message(self._model, evidence, fed.clock, self.settings.precision)
+            self._evidence.put(told, fed.origin)
 
     def _on_restart(self, index: int) -> None:
         self._recent.clear()
@@ -122,19 +120,6 @@ class GestemeClassifier(Service):
             fresh.step(step_of(fed.step))
         self._bank = self._bank.replaced(fresh, sorted(held & wanted))
         self.log.info("gestemes held", extra=self.facts() | {"peers": len(self._peers)})
-
-    def _message(self, evidence: StepEvidence, clock: str) -> Evidence:
-        names = self._model.gesteme_names
-        return Evidence(
-            model_hash=self._model.hash,
-            clock=clock,
-            step=evidence.step,
-            gestemes=tuple(names[g] for g in evidence.gestemes),
-            pair_gesteme=np.searchsorted(evidence.gestemes, evidence.pair_gesteme).astype(np.int32),
-            pair_start=evidence.pair_start,
-            exit=evidence.exit.astype(self._dtype),
-            log_ratio=evidence.log_ratio.astype(self._dtype),
-        )
 
 
 def _named(wanted: tuple[str, ...], known: tuple[str, ...], model: object) -> frozenset[int]:

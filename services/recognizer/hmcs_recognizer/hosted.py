@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import logging
 
-from hmcs.bus.messages import Belief
+from hmcs.bus.messages import Belief, Evidence
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import kind_named, recognizer_of
-from hmcs.translation import belief_message, step_of
+from hmcs.translation import belief_message, evidence_message, step_of
 
 
 class Hosted:
-    """Publishes a belief for every step, under the name of its model."""
+    """Publishes a belief for every step, under the name of its model, and the evidence it stands
+    on, where it has a layer of gesteme models."""
 
     def __init__(
         self, model: Model, bus: Bus, log: logging.Logger, service: str, memory_steps: int
@@ -25,6 +26,7 @@ class Hosted:
         self._recognizer = recognizer_of(model)
         self._ready = False
         self._belief = bus.publisher(Belief, bus.keys.belief(model.name))
+        self._evidence = bus.publisher(Evidence, bus.keys.evidence(model.name, bus.source.instance))
         self._feed = StepFeed(bus, log, self._on_step, self._on_restart, memory_steps=memory_steps)
 
     @property
@@ -54,4 +56,7 @@ class Hosted:
         recognition = self._recognizer.step(step_of(fed.step))
         if self._ready:
             self.believed += 1
+            if recognition.evidence is not None:
+                told = evidence_message(self.model, recognition.evidence, fed.clock, "float64")
+                self._evidence.put(told, fed.origin)
             self._belief.put(belief_message(self.model, recognition, fed.clock), fed.origin)

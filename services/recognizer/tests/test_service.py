@@ -137,6 +137,33 @@ def test_it_takes_another_model_while_it_runs(bench: Bench, taught: Taught, tmp_
     np.testing.assert_array_equal(told[0].probabilities, told[1].probabilities)
 
 
+def test_of_a_layered_model_it_tells_the_evidence_its_beliefs_stand_on(
+    bench: Bench, tmp_path: Path
+) -> None:
+    layered = learn(lesson_task(), [performed(1), performed(2)])
+    file = tmp_path / "layered.hmcs"
+    model = save_model(layered._replace(name="layered"), file)
+    scene = bench.scene
+    with ThreadPoolExecutor(1) as aside:
+        loading = aside.submit(bench.service._load, LoadModel(path=str(file)))
+        while not loading.done():
+            scene.bus.pump(0.01)
+    steps = steps_performed(6)[:30]
+    for step in steps:
+        scene.hand.step(step)
+    bench.until_believed(2 * len(steps))
+    scene.stack.until(lambda: len(scene.watcher.evidence) >= len(steps))
+    assert {received.key.split("/")[-3] for received in scene.watcher.evidence} == {"layered"}
+    recognizer = recognizer_of(model)
+    for received, step in zip(scene.watcher.evidence, steps, strict=True):
+        expected = recognizer.step(step).evidence
+        assert expected is not None
+        assert received.body.step == step.index
+        np.testing.assert_array_equal(received.body.pair_start, expected.pair_start)
+        np.testing.assert_array_equal(received.body.exit, expected.exit)
+        np.testing.assert_array_equal(received.body.log_ratio, expected.log_ratio)
+
+
 def test_without_a_model_it_waits_to_be_given_one() -> None:
     assert RecognizerSettings(model="").model is None
     assert RecognizerSettings().model is None

@@ -91,13 +91,12 @@ class LayeredRecognizer:
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
-        evidence = self._bank.step(step)
-        return self.task.step(
-            evidence._replace(
-                exit=_rounded(evidence.exit, self._precision),
-                log_ratio=_rounded(evidence.log_ratio, self._precision),
-            )
+        exact = self._bank.step(step)
+        evidence = exact._replace(
+            exit=_rounded(exact.exit, self._precision),
+            log_ratio=_rounded(exact.log_ratio, self._precision),
         )
+        return self.task.step(evidence)._replace(evidence=evidence)
 
 
 def _rounded(values: Array, precision: Precision) -> Array:

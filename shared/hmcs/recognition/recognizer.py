@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.gestemes import StepEvidence
 from hmcs.recognition.segment_filter import TaskBelief
 
 
@@ -22,6 +23,8 @@ class Recognition(NamedTuple):
     """How well the last steps fit the task: mean over the alarm window, nats."""
     unknown_alarm: bool
     """True where that mean is below the model's threshold."""
+    evidence: StepEvidence | None = None
+    """What the gesteme models made of the step; None where there is no such layer below."""
 
 
 class Recognizer(Protocol):

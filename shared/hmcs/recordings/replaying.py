@@ -195,8 +195,10 @@ def _recorded(content: RecordingContent, model: Model) -> tuple[str, dict[tuple[
 
 def _precision(content: RecordingContent, model: Model) -> Precision:
     """That of the classifiers which worked with this model; double where there were none."""
-    evidence = content.of(Evidence)
-    if not any(message.model_hash == model.hash for _, _, message in evidence):
+    if not any(
+        message.model_hash == model.hash and envelope.source.service == "gesteme_classifier"
+        for _, envelope, message in content.of(Evidence)
+    ):
         return "float64"
     for name, facts in content.metadata.items():
         if name.startswith("gesteme_classifier/") and "settings" in facts:
