@@ -11,7 +11,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench peers schemas test-containers clean
+.PHONY: help setup demo test lint bench peers test-browser schemas test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -35,6 +35,10 @@ bench: $(READY) ## measure speed and recognition in full, each against its goal;
 
 peers: $(READY) ## install the libraries that studies compare with, beside the rest
 	@$(UV) sync --frozen --quiet --group peers --python $(RUN)/python
+
+test-browser: $(READY) ## drive the operator's page in a chromium, with playwright installed beside the rest
+	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
+	@$(RUN)/python -m pytest -m browser tests/browser
 
 schemas: $(READY) ## rewrite JSON Schemas, golden bytes and the page of all messages
 	@$(RUN)/python -m hmcs.bus.schemas tests/contract

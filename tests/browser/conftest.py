@@ -40,10 +40,6 @@ OPERATED = (
 OpenViewer = Callable[..., Viewer]
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "browser: needs playwright and a chromium")
-
-
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A chromium that yields to the processes that are tested."""
