@@ -31,10 +31,10 @@ from hmcs.bus.messages import (
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus, Received
 from hmcs.fixtures.controller import Controller, Fixture, UnknownModelError
+from hmcs.fixtures.driver import Driver
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import guides_of, sample_of, segment_belief_of
-from hmcs_fixture_controller.driver import Driver
 from hmcs_fixture_controller.models import load_models
 from hmcs_fixture_controller.settings import FixtureControllerSettings
 from hmcs_fixture_controller.translation import command_of, state_of
@@ -236,7 +236,18 @@ class FixtureController(Service):
 
         Raises ModelFileError where it cannot be used; nothing changes then.
         """
-        return self._load(load_model(path))
+        model, followed = load_model(path), self._models.get(self._controller.active)
+        told = self._load(model)
+        if followed is None or followed.task.name == model.task.name:
+            return told
+        self.log.warning(
+            "a model of another task",
+            extra={"model": model.name, "task": model.task.name, "followed": followed.task.name},
+        )
+        return (
+            f"{told}; mind that it is of task {model.task.name!r}, the followed one of "
+            f"{followed.task.name!r}: its guides and limits are those of its own task"
+        )
 
     def activate(self, name: str) -> str:
         """Follow the recognizer of a loaded model from now on; return what is so now.

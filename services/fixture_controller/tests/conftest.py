@@ -60,17 +60,22 @@ def task(name: str) -> Task:
     )
 
 
-def model(name: str, length_m: float) -> Model:
-    return line_model(name, task(name), np.array([[0.0, 0, 0], [length_m, 0, 0]]))
+def model(name: str, length_m: float, of_task: str = "one-line") -> Model:
+    return line_model(name, task(of_task), np.array([[0.0, 0, 0], [length_m, 0, 0]]))
 
 
 @pytest.fixture
 def make_model(tmp_path: Path) -> Callable[..., Path]:
     """Write a model file whose one gesteme is a line along x."""
 
-    def make(name: str = "lines", length_m: float = 0.5, folder: str = "models") -> Path:
+    def make(
+        name: str = "lines",
+        length_m: float = 0.5,
+        folder: str = "models",
+        of_task: str = "one-line",
+    ) -> Path:
         path = tmp_path / folder / f"{name}.hmcs"
-        save_model(model(name, length_m), path)
+        save_model(model(name, length_m, of_task), path)
         return path
 
     return make

@@ -158,6 +158,16 @@ def test_a_recognizer_is_loaded_and_activated_on_demand(
     assert (cell.states[-1].reason, cell.states[-1].model) == ("guiding", "lines")
 
 
+def test_a_model_of_another_task_than_the_followed_one_is_told(
+    make_cell: MakeCell, make_model: MakeModel
+) -> None:
+    cell = make_cell(models=(make_model("circles"),), active_model="circles")
+    other = make_model("lines", folder="more", of_task="welding")
+    loaded = cell.ask("load_model", LoadModel(path=str(other)), Done)
+    assert "it is of task 'welding', the followed one of 'one-line'" in loaded.detail
+    assert cell.service.facts()["active_model"] == "circles"
+
+
 def test_a_model_file_that_cannot_be_used_is_refused_and_nothing_changes(
     make_cell: MakeCell, make_model: MakeModel, tmp_path: Path
 ) -> None:
