@@ -38,7 +38,11 @@ def assert_equal(some: list[Recognition], others: list[Recognition]) -> None:
     for one, other in zip(some, others, strict=True):
         np.testing.assert_array_equal(one.belief.states, other.belief.states)
         assert one.belief._replace(states=None) == other.belief._replace(states=None)
-        assert one[1:] == other[1:]
+        assert one._replace(belief=None, evidence=None) == other._replace(
+            belief=None, evidence=None
+        )
+        for told, expected in zip(one.evidence or (), other.evidence or (), strict=True):
+            np.testing.assert_array_equal(told, expected)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -25,7 +25,6 @@ MOTION = next(example for example in EXAMPLES if isinstance(example, Motion))
 
 relaxed = settings(
     max_examples=25,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 

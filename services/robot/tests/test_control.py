@@ -32,9 +32,7 @@ def assert_within_limits(bench: Any, after: str) -> None:
     assert np.linalg.norm(twist[3:]) <= SPEED_TOLERANCE * limits.angular_speed_rad_s, after
 
 
-@settings(
-    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(twists, st.integers(1, 80)), min_size=1, max_size=8))
 def test_no_finite_command_leads_beyond_a_limit(
     bench: Any, commands: list[tuple[np.ndarray, int]]

@@ -95,7 +95,7 @@ def test_not_renormalizing_lets_the_error_change_the_length_too() -> None:
     assert lengths[1] != pytest.approx(lengths[0], rel=0.01)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.integers(0, 10_000), st.sampled_from([2, 3]), st.sampled_from(["line", "circle", "mixed"])
 )

@@ -20,7 +20,7 @@ LABELED_TWICE = st.integers(1, 30).flatmap(
 INDICES = st.lists(st.integers(0, 20), max_size=5)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(LABELED_TWICE)
 def test_adjusted_rand_index_is_that_of_scikit_learn(labels):
     true, found = labels
@@ -44,7 +44,7 @@ def test_labels_that_are_not_of_the_same_steps_are_refused(true, found):
         adjusted_rand_index(true, found)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(INDICES, INDICES, st.integers(0, 4))
 def test_as_many_boundaries_are_matched_as_any_pairing_could(true, found, tolerance):
     few, many = sorted([true, found], key=len)

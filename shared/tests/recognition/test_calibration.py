@@ -46,7 +46,7 @@ def test_overconfidence_has_its_known_error():
     assert event_reliability(said, rng.random(len(p)) < p).error == pytest.approx(0.125, abs=0.004)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), bins=st.integers(1, 20))
 def test_bins_are_what_their_definition_says(seed, bins):
     said, true = calibrated(seed, 60)
@@ -71,7 +71,7 @@ def test_certainty_and_impossibility_have_bins_too():
     assert found.error == 0
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10**6))
 def test_the_brier_score_is_least_for_the_true_probabilities(seed):
     said, true = calibrated(seed, 4000)

@@ -25,7 +25,7 @@ def blobs(rng, centers, count=40, spread=0.05):
 SQUARE = [[0, 0], [0, 1], [1, 0], [1, 1]]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6), clusters=st.integers(1, 8))
 def test_inertia_is_scikit_learns_from_the_same_start(seed, clusters):
     rng = np.random.default_rng(seed)
@@ -38,7 +38,7 @@ def test_inertia_is_scikit_learns_from_the_same_start(seed, clusters):
     assert (ours.members == theirs.labels_).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6))
 def test_stationary_centers_are_the_means_of_their_nearest_points(seed):
     rng = np.random.default_rng(seed)

@@ -53,7 +53,7 @@ def stretch_cost(positions, direction, correlation, weight):
     )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     seed=st.integers(0, 10**6),
     axes=st.integers(2, 3),
@@ -79,7 +79,7 @@ def test_costs_are_what_their_definition_says(seed, axes, correlation, weight):
         assert (costs[:, last, first] >= least[last, first] - 1e-9).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), penalty=st.floats(0, 2), least_steps=st.integers(1, 3))
 def test_a_cut_is_the_best_of_all(seed, penalty, least_steps):
     costs = np.random.default_rng(seed).uniform(size=(9, 9))
@@ -98,7 +98,7 @@ def test_a_cut_is_the_best_of_all(seed, penalty, least_steps):
     assert sum(costs[p.last, p.first] + penalty for p in pieces) == pytest.approx(min(every))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), penalty=st.floats(0, 1), least_steps=st.integers(1, 3))
 def test_lines_are_laid_in_the_best_of_all_ways(seed, penalty, least_steps):
     lines, count = 3, 8

@@ -112,7 +112,10 @@ def spoiled(values):
     [
         (lambda m: [], "no demonstrations of task 'corner'"),
         (lambda m: [bad(m, states=(None,) * len(m.states))], "has no labels: add a column 'state'"),
-        (lambda m: [bad(m, states=("fly",) * len(m.states))], "'fly' is no state.*go, turn, rise"),
+        (
+            lambda m: [bad(m, states=("fly",) * len(m.states))],
+            "'fly' at .* s is no state.*go, turn, rise",
+        ),
         (lambda m: [bad(m, states=("go",) * len(m.states))], "gesteme 'round'.*no demonstration"),
         (lambda m: [bad(m, states=m.states[:-5])], "labels for .* samples: give one each"),
         (lambda m: [bad(m, positions=m.positions[:, :2])], r"positions have shape .*, 3\)"),

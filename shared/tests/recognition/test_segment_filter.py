@@ -117,7 +117,7 @@ def enumerate_segmentations(chain, evidence):
     shared=st.booleans(),
     hole=st.booleans(),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_filter_is_exact_over_every_segmentation(seed, steps, shared, hole):
     rng = np.random.default_rng(seed)
     chain = random_chain(rng, shared=shared)
@@ -159,7 +159,7 @@ def test_the_likely_segment_start_is_that_of_the_heaviest_hypothesis():
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_beliefs_are_finite_and_sum_to_one_whatever_the_evidence(seed):
     rng = np.random.default_rng(seed)
     chain = random_chain(rng)

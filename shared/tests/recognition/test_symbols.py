@@ -46,7 +46,7 @@ def test_fitted_bins_span_what_was_seen_and_hold_a_constant_feature():
     assert len(np.unique(bins.encode([[0.5, 3.0], [3.5, 3.0]])[:, 1])) == 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 10**6),
     steps=st.integers(1, 25),

@@ -30,7 +30,7 @@ TOPOLOGIES = {
     states=st.integers(1, 9),
     spread=st.sampled_from([1.0, 400.0]),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_every_model_is_filtered_as_by_itself(seed, topology, models, states, spread):
     rng = np.random.default_rng(seed)
     initial = rng.dirichlet(np.ones(states), models)

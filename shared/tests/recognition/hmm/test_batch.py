@@ -57,7 +57,7 @@ def work(random_model):
     kind=st.sampled_from(["discrete", "gaussian"]),
     learn=st.sampled_from([ALL, CHAIN, EMISSION]),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_together_equals_one_by_one(work, seed, kind, learn):
     assert_equal_one_by_one(*work(seed, kind), learn=learn, max_iterations=6, tolerance=-np.inf)
 

@@ -72,7 +72,7 @@ def segmentations(model, log_emission, path=(), bounds=(), p=None):
     steps=st.integers(1, 4),
     ending=st.booleans(),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_inference_equals_the_sum_over_every_segmentation(seed, states, longest, steps, ending):
     model = random_model(seed, states, longest, ending)
     emission = random_emission(seed + 1, steps, states)
@@ -98,7 +98,7 @@ def test_inference_equals_the_sum_over_every_segmentation(seed, states, longest,
 
 
 @given(seed=st.integers(0, 10_000), states=st.integers(1, 4), longest=st.integers(1, 7))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_direct_recursions_equal_the_expanded_hmm(seed, states, longest):
     model = random_model(seed, states, longest)
     emission = random_emission(seed + 1, 30, states)

@@ -80,7 +80,7 @@ def test_an_estimator_is_inverted_by_bayes_rule():
     seed=st.integers(0, 10_000),
     kind=st.sampled_from(["discrete", "multi-discrete", "gaussian", "mixture"]),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_reestimation_never_lowers_the_weighted_likelihood(random_emission, seed, kind):
     rng = np.random.default_rng([seed, 3])
     emission = random_emission(kind, seed, 3)
@@ -112,7 +112,7 @@ def test_reestimated_symbols_are_counted_over_all_sequences():
     symbols=st.integers(2, 8),
     share=st.floats(0.0, 1.0),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_floor_is_honored_and_rows_still_sum_to_one(seed, symbols, share):
     rng = np.random.default_rng(seed)
     floor = share / symbols
@@ -124,7 +124,7 @@ def test_the_floor_is_honored_and_rows_still_sum_to_one(seed, symbols, share):
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_no_row_above_the_floor_explains_counts_better_than_the_floored_one(seed):
     rng = np.random.default_rng(seed)
     counts = rng.dirichlet(np.full(4, 0.3))[None]

@@ -90,7 +90,7 @@ def walks(root, likelihood, t=0, stack=None):
 
 
 @given(seed=st.integers(0, 10_000), depth=st.integers(1, 3), steps=st.integers(1, 3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_flattened_model_equals_the_sum_over_every_walk_of_control(seed, depth, steps):
     rng = np.random.default_rng(seed)
     root = random_tree(rng, depth)

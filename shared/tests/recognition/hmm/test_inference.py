@@ -27,7 +27,7 @@ def random_log_emission(seed, steps, states):
 
 
 @given(**tiny, zeros=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_evaluation_is_the_sum_over_every_state_path(
     random_chain, every_path, seed, states, steps, zeros
 ):
@@ -39,7 +39,7 @@ def test_evaluation_is_the_sum_over_every_state_path(
 
 
 @given(**tiny, zeros=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_decoding_finds_the_cheapest_of_all_paths(
     random_chain, every_path, seed, states, steps, zeros
 ):
@@ -56,7 +56,7 @@ def test_decoding_finds_the_cheapest_of_all_paths(
 
 
 @given(**tiny)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_costs_and_predecessors_are_those_of_the_cheapest_path_to_each_state(
     random_chain, every_path, seed, states, steps
 ):
@@ -76,7 +76,7 @@ def test_costs_and_predecessors_are_those_of_the_cheapest_path_to_each_state(
 
 
 @given(**tiny, zeros=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_posteriors_are_shares_of_every_state_path(
     random_chain, every_path, seed, states, steps, zeros
 ):
@@ -98,7 +98,7 @@ def test_posteriors_are_shares_of_every_state_path(
 
 
 @given(seed=seeds, states=st.integers(1, 6), steps=st.integers(1, 60), zeros=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_scaled_equals_logarithms(random_chain, seed, states, steps, zeros):
     initial, transition = random_chain(seed, states, zeros)
     emission = random_log_emission(seed, steps, states)

@@ -41,7 +41,7 @@ def posterior(prior, models, observations):
 
 
 @given(seed=st.integers(0, 10_000), states=st.integers(1, 4))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_one_layer_of_one_model_is_the_forward_filter(seed, states):
     rng = np.random.default_rng(seed)
     model, observations = gaussian(rng, states), rng.normal(size=(20, 2))
@@ -55,7 +55,7 @@ def test_one_layer_of_one_model_is_the_forward_filter(seed, states):
 
 
 @given(seed=st.integers(0, 10_000), window=st.one_of(st.none(), st.integers(1, 6)))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_models_in_parallel_are_as_probable_as_their_window_makes_them(seed, window):
     rng = np.random.default_rng(seed)
     models = tuple(gaussian(rng, states) for states in (1, 3, 2))
@@ -76,7 +76,7 @@ def test_models_in_parallel_are_as_probable_as_their_window_makes_them(seed, win
 
 
 @given(seed=st.integers(0, 10_000), passes=st.sampled_from(["winner", "distribution"]))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_every_layer_sums_to_one_after_every_step(seed, passes):
     rng = np.random.default_rng(seed)
     layers = [

@@ -92,7 +92,7 @@ def test_a_mixture_takes_the_same_step_as_hmmlearn(random_model, seed):
 
 
 @given(seed=st.integers(0, 10_000), kind=st.sampled_from(KINDS), floor=st.sampled_from([0.0, 0.02]))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_every_iteration_raises_the_likelihood(random_model, seed, kind, floor):
     sequences = sequences_of(random_model(kind, seed + 1, 2), seed)
     initial, transition, emission = random_model(kind, seed, 3)
@@ -108,7 +108,7 @@ def test_every_iteration_raises_the_likelihood(random_model, seed, kind, floor):
 
 
 @given(seed=st.integers(0, 10_000), kind=st.sampled_from(KINDS))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_every_realignment_raises_the_joint_likelihood(random_model, seed, kind):
     sequences = sequences_of(random_model(kind, seed + 1, 2), seed)
     learned = segmental_k_means(random_model(kind, seed, 2), sequences, tolerance=-np.inf)

@@ -30,7 +30,7 @@ def random_model(seed, states):
 
 
 @given(seed=st.integers(0, 10_000), states=st.integers(1, 4), steps=st.integers(1, 5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_prediction_and_total_probability_equal_the_sum_over_every_sequence(seed, states, steps):
     model = random_model(seed, states)
     ends = np.zeros(states)
@@ -47,7 +47,7 @@ def test_an_impossible_sequence_has_probability_zero():
 
 
 @given(seed=st.integers(0, 10_000), states=st.integers(1, 6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_stationary_distribution_is_what_far_prediction_comes_to(seed, states):
     model = random_model(seed, states)
     settled = stationary(model)

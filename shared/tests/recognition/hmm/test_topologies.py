@@ -19,7 +19,7 @@ inside = st.floats(0.01, 0.49)
 
 
 @given(states=st.integers(1, 8), epsilon=inside, other=inside)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_every_row_of_every_topology_sums_to_one(states, epsilon, other):
     for transition in (
         fully_connected(states, other),

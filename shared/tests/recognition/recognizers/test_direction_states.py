@@ -148,7 +148,7 @@ def test_baum_welch_starts_from_3_4() -> None:
     np.testing.assert_allclose(known.transition, fully_connected(len(known.directions), 0.6))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 4),

@@ -66,7 +66,7 @@ def posterior(log_likelihoods: np.ndarray) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_network_is_the_recursion_of_the_text(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chains, log_emissions = random_chains(rng), random_emissions(rng, 12)
@@ -90,7 +90,7 @@ def test_the_network_is_the_recursion_of_the_text(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_given_restarts_evaluate_each_segment_by_itself(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chains, log_emissions = random_chains(rng), random_emissions(rng, 15)
@@ -158,7 +158,7 @@ def test_cusum_keeps_no_more_than_it_may_need() -> None:
 
 
 @given(st.lists(st.floats(-5, 0), min_size=1, max_size=40))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_cusum_test_is_that_of_the_text(values: list[float]) -> None:
     test = Cusum(CusumSettings(drift_nats=0.3, threshold_nats=2.0))
     statistic, zero = 0.0, 0
