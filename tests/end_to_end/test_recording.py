@@ -9,9 +9,10 @@ import pytest
 
 from hmcs.bus.messages import Ask, Health, Motion
 from hmcs.motion.steps import Step
+from hmcs.recordings.comparing import compared
 from hmcs.recordings.inspection import inspected
 from hmcs.recordings.reading import RecordingContent, read
-from hmcs.recordings.replaying import compared, kept_model, replayed
+from hmcs.recordings.replaying import kept_model, replayed
 from support.hand import PERIOD_S, Scene
 
 

@@ -233,6 +233,13 @@ def train(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of what is drawn at random in learning.")] = 0,
+    find_states: Annotated[
+        bool,
+        typer.Option(
+            "--find-states",
+            help="Find gestemes and states in the motion itself, whatever labels it has.",
+        ),
+    ] = False,
     report: Annotated[
         bool, typer.Option(help="Write a page beside the model on what it is worth.")
     ] = True,
@@ -240,7 +247,8 @@ def train(
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
     The page tells how each demonstration is recognized by a model of the others, which states are
-    taken for each other, how far demonstrations lay apart, and what would help.
+    taken for each other, how far demonstrations lay apart, and what would help. States that are
+    found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
     from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
@@ -256,6 +264,7 @@ def train(
             settings=dict(map(_setting, settings or [])),
             choices=alternatives,
             seed=seed,
+            find_states=find_states,
             report=output.with_suffix(".html") if report else None,
             progress=typer.echo,
             fits=fits,
@@ -334,6 +343,40 @@ def inspect(
 
 
 @app.command()
+def label(
+    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    sets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="BEGIN-END=STATE",
+            help="Label a stretch, in seconds, e.g. 1.2-3.9=take; may be repeated.",
+        ),
+    ] = None,
+    clear: Annotated[
+        bool, typer.Option("--clear", help="Take all labels away, before any --set.")
+    ] = False,
+    task: Annotated[
+        str, typer.Option(help="Labels must be states of it: a shipped task's name or a file.")
+    ] = "",
+) -> None:
+    """Show which part of the task each moment of a recording was, or say it afterwards.
+
+    What is set stands in NAME.labels.csv beside the recording, which is never changed.
+    """
+    from hmcs.task import load_task
+    from hmcs_local.labeling import label_recording
+
+    label_recording(
+        recording,
+        sets or [],
+        clear=clear,
+        task=load_task(task) if task else None,
+        console=Console(soft_wrap=True),
+    )
+
+
+@app.command()
 def export(
     recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
     to: Annotated[Path, typer.Option(metavar="DIR", help="The folder the files are written to.")],
@@ -361,6 +404,10 @@ def replay(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write every step as a CSV file.")
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw both over time; .png or .svg."),
+    ] = None,
     live: Annotated[
         bool, typer.Option("--live", help="Through the live stack, in place of its input device.")
     ] = False,
@@ -374,12 +421,28 @@ def replay(
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
 ) -> None:
-    """Let a recorded operator move again: in process beside what was believed then, or live."""
-    from hmcs_local.recordings import replay_in_process, replay_live
+    """Let a recorded operator move again: in process beside what was believed then, or live.
+
+    In process, a recognizer of the model believes anew, and the fixture does what it would have
+    done by that: an open loop, in which hand and robot are where they were recorded and react to
+    nothing. Both stand beside what was recorded.
+
+    --json: `steps` `compared` `same_bits` `agreement` `later_steps` of the beliefs; shares right by
+    the labels `replayed_right` `recorded_right`; `times_real` as fast as it happened; of the
+    fixture, over its ticks with a recorded one, `fixture_ticks` `_compared`, mean |Δk|
+    `_factor_apart`, shares `_factor_close` (within 0.02) `_same_state` `_guides_both`
+    `_guides_recorded_only` `_guides_replayed_only`, `_directions_apart_deg`,
+    `_velocities_apart_mm_s` (RMS), `_recorded_off_guide_mm` `_replayed_off_guide_mm`, how often and
+    how much later it takes hold and lets go `_recorded_takes_hold` `_replayed_takes_hold`
+    `_takes_hold_later_ms` `_recorded_lets_go` `_replayed_lets_go` `_lets_go_later_ms`,
+    `_times_real`; `notes` on what is missing. null where there is nothing to measure.
+    """
+    from hmcs_local.replays import Files, replay_in_process, replay_live
 
     if live:
         raise typer.Exit(replay_live(recording, rate, task, router, cell))
-    replay_in_process(recording, model, out, Console(soft_wrap=True), as_json=as_json)
+    console = Console(soft_wrap=True)
+    replay_in_process(recording, model, Files(out, picture), console, as_json=as_json)
 
 
 @app.command()

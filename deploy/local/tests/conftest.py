@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import textwrap
 import time
 from collections.abc import Callable
@@ -13,8 +16,11 @@ import psutil
 import pytest
 import yaml
 
+from hmcs_local.command import main
 from hmcs_local.control import ControlServer
 from hmcs_local.stack import LocalStack
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
 
 FAKE_CLASSIFIER = textwrap.dedent(
     """
@@ -110,3 +116,30 @@ def is_gone() -> Callable[[int], bool]:
             return True
 
     return gone
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    kept = {key: value for key, value in os.environ.items() if not key.startswith("HMCS_")}
+    return {**kept, "XDG_RUNTIME_DIR": str(tmp_path), "COLUMNS": "160"}
+
+
+@pytest.fixture
+def hmcs(
+    environment: dict[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> Run:
+    """Run `hmcs` to its end, in this process: starting Python takes longer than most commands."""
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(os, "environ", environment)
+        monkeypatch.setattr(sys, "argv", ["hmcs", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capfd.readouterr()
+        return subprocess.CompletedProcess(words, int(ended.value.code or 0), said.out, said.err)
+
+    return run

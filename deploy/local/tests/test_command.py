@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import signal
 import socket
 import subprocess
@@ -12,8 +11,6 @@ from typing import Any
 import psutil
 import pytest
 
-from hmcs_local.command import main
-
 Describe = Callable[..., dict[str, Any]]
 Eventually = Callable[[Callable[[], Any]], Any]
 IsGone = Callable[[int], bool]
@@ -24,33 +21,6 @@ IGNORES_SIGINT = (
     "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN);"
     "print('up', flush=True); time.sleep(600)"
 )
-
-
-@pytest.fixture
-def environment(tmp_path: Path) -> dict[str, str]:
-    kept = {key: value for key, value in os.environ.items() if not key.startswith("HMCS_")}
-    return {**kept, "XDG_RUNTIME_DIR": str(tmp_path), "COLUMNS": "160"}
-
-
-@pytest.fixture
-def hmcs(
-    environment: dict[str, str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> Run:
-    """Run `hmcs` to its end, in this process: starting Python takes longer than most commands."""
-
-    def run(*words: str) -> subprocess.CompletedProcess[str]:
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(os, "environ", environment)
-        monkeypatch.setattr(sys, "argv", ["hmcs", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capfd.readouterr()
-        return subprocess.CompletedProcess(words, int(ended.value.code or 0), said.out, said.err)
-
-    return run
 
 
 @pytest.fixture

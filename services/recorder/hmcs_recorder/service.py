@@ -1,7 +1,8 @@
 """The service: everything that is published in the cell, into a file, and never in anybody's way.
 
 Where the disk is full the recording ends, which is told in health and log; what comes from then on
-is counted as lost, and recording goes on in a new file as soon as there is room.
+is counted as lost, and recording goes on in a new file as soon as there is room. Recordings are
+read, to set labels by, on a thread of its own meanwhile.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import importlib.metadata
 import json
 import logging
 import time
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,7 +26,10 @@ from hmcs.bus.messages import (
     Envelope,
     LastSteps,
     LastStepsQuestion,
+    Outline,
+    OutlineQuestion,
     Record,
+    SetLabels,
     SettingsReport,
 )
 from hmcs.bus.service import Service
@@ -32,6 +37,7 @@ from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.wire import encode
 from hmcs.recordings.parts import Limits, Preface, Recording, as_fields
 from hmcs.recordings.plain import Fields, fields_of
+from hmcs_recorder.labeling import labels_set, outline_of
 from hmcs_recorder.settings import RecorderSettings
 
 LOST = "recording"
@@ -60,10 +66,13 @@ class Recorder(Service):
         self._again_s = 0.0
         self._sequences = Sequences()
         self._wall_minus_monotonic_ns = time.time_ns() - time.monotonic_ns()
+        self._reading = ThreadPoolExecutor(1, thread_name_prefix="reading")
 
     def start(self) -> None:
         """Listen, and record unless told to wait."""
         self.bus.answer("record", Record, self._asked)
+        self.bus.answer("outline", OutlineQuestion, self._outline, aside=self._reading)
+        self.bus.answer("set_labels", SetLabels, self._set_labels, aside=self._reading)
         self.bus.listen(self.bus.keys.everything, self._on_arrival)
         if self.settings.autostart:
             self._begin("")
@@ -90,6 +99,13 @@ class Recorder(Service):
     def close(self) -> None:
         """End the recording."""
         self._end()
+        self._reading.shutdown(cancel_futures=True)
+
+    def _outline(self, asked: OutlineQuestion) -> Outline:
+        return outline_of(self.settings, asked)
+
+    def _set_labels(self, asked: SetLabels) -> Done:
+        return labels_set(self.settings, asked)
 
     def _asked(self, asked: Record) -> Done:
         if not asked.on:

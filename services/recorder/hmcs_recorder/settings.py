@@ -29,3 +29,6 @@ class RecorderSettings(ServiceSettings):
     """So much of the disk is left to others."""
     flush_s: float = Field(default=0.5, gt=0.0, le=60.0)
     """What came longer ago than this outlives an end by kill -9."""
+    outline_mb: float = Field(default=64.0, gt=0.0)
+    """Recordings up to so large are read for the page, to set labels by; reading larger ones would
+    take too long."""

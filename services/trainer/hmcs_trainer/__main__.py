@@ -34,7 +34,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="hmcs_trainer", description=__doc__)
     parser.add_argument("task", help="name of a shipped task or a task file")
     parser.add_argument(
-        "demonstrations", nargs="+", help="CSV files, or lasa:SHAPE/NUMBER or lasa:SHAPE/FIRST-LAST"
+        "demonstrations",
+        nargs="+",
+        help="CSV files, recordings, lasa:SHAPE/NUMBER or lasa:SHAPE/FIRST-LAST",
     )
     parser.add_argument("--output", required=True, help="the model file to write")
     parser.add_argument("--name", help="of the recognizer; the task's name by default")
@@ -46,6 +48,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--ring", action="store_true", help="bend the performance to end where it began"
     )
     parser.add_argument("--recognizer", default=DEFAULT, help="the kind to learn for")
+    parser.add_argument(
+        "--find-states", action="store_true", help="find states in the motion, without labels"
+    )
     parser.add_argument("--report", help="the page to write on what the model is worth")
     parser.add_argument(
         "--tell", action="store_true", help="tell what is done on stdout, a line of JSON each"
@@ -60,6 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             given.output,
             name=given.name,
             recognizer=given.recognizer,
+            find_states=given.find_states,
             report=given.report,
             progress=tell if given.tell else lambda line: print(line, file=sys.stderr),
             fits=tell_fits if given.tell else lambda _done, _all: None,

@@ -129,6 +129,7 @@ class _Job:
         command = [sys.executable, "-m", "hmcs_trainer", asked.task, *asked.demonstrations]
         command += ["--output", str(self.path), "--name", asked.model, "--tell"]
         command += ["--recognizer", asked.recognizer or DEFAULT, "--report", str(self.report)]
+        command += ["--find-states"] if asked.find_states else []
         self._process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

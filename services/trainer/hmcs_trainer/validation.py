@@ -153,7 +153,5 @@ def _lasts_s(demonstration: Demonstration, samples: slice) -> float:
 
 def _when(demonstration: Demonstration, samples: slice) -> str:
     last = min(samples.stop, len(demonstration.time_s)) - 1
-    begin_s, end_s = (
-        demonstration.time_s[at] - demonstration.time_s[0] for at in (samples.start, last)
-    )
+    begin_s, end_s = (demonstration.time_s[at] for at in (samples.start, last))
     return f"{begin_s:.1f} s to {end_s:.1f} s"

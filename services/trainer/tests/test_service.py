@@ -6,11 +6,14 @@ import logging
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hmcs.bus.messages import Ask, Train, TrainingProgress
 from hmcs.bus.session import RequestRefusedError
+from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.recognition.model_file import load_model
+from hmcs.task import find_task, load_task
 from hmcs_trainer.service import Trainer
 from hmcs_trainer.settings import TrainerSettings
 from support.stack import Stack
@@ -81,3 +84,25 @@ def test_a_training_is_canceled_without_a_trace(bench: Bench) -> None:
     assert "canceled mine" in bench.trainer._cancel(Ask()).detail
     bench.until("canceled")
     assert list(bench.folder.iterdir()) == []
+
+
+def test_states_are_found_when_asked_for(bench: Bench) -> None:
+    corners = read_csv(find_task("lines-through-obstacles").with_suffix(".csv"))
+    time_s = np.arange(0.0, corners.time_s[-1], 0.02)
+    lines = np.stack([np.interp(time_s, corners.time_s, c) for c in corners.positions.T], axis=1)
+    files = []
+    for seed in (1, 2):
+        wander = np.random.default_rng(seed).normal(scale=4e-4, size=lines.shape).cumsum(axis=0)
+        files.append(str(bench.folder.parent / f"take-{seed}.csv"))
+        shown = Demonstration("shown", time_s, lines + wander, (None,) * len(time_s))
+        write_csv(files[-1], shown)
+    asked = Train(
+        model="found",
+        task="lines-through-obstacles",
+        demonstrations=tuple(files),
+        find_states=True,
+    )
+    bench.trainer._train(asked)
+    done = bench.until("done")
+    assert "4 states of 4 gestemes found in 2 demonstrations" in done.detail
+    assert load_task(bench.folder / "found.yaml") == load_model(done.path).task

@@ -1,7 +1,8 @@
 """Zenoh behind typed messages: open, publish, subscribe, ask, answer, presence.
 
 Whatever arrives on Zenoh's threads is only put into a mailbox. Decoding, counting, refusing and
-every handler run in the one thread that calls `Bus.pump`, so a service needs no locks.
+every handler run in the one thread that calls `Bus.pump`, so a service needs no locks. Only answers
+that take their time are made aside, where that is asked for.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import secrets
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable
+from concurrent.futures import Executor
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
@@ -265,19 +267,33 @@ class Bus:
 
     # --- questions --------------------------------------------------------------------------------
 
-    def answer(self, verb: str, question_type: type[Q], handler: Callable[[Q], Message]) -> None:
+    def answer(
+        self,
+        verb: str,
+        question_type: type[Q],
+        handler: Callable[[Q], Message],
+        *,
+        aside: Executor | None = None,
+    ) -> None:
         """Answer questions of `question_type` on this process' key of `verb`.
 
-        Where `handler` raises RequestRefusedError or UserError the asker gets a Refusal with its
-        message; any other exception refuses as well and then leaves `pump`.
+        An answer that takes long is made `aside`, on threads of its own, and holds nobody up; its
+        handler may touch nothing that others change. Where `handler` raises RequestRefusedError or
+        UserError the asker gets a Refusal with its message; any other exception refuses as well and
+        then leaves `pump`.
         """
         key = self.keys.rpc(self.source.service, self.source.instance, verb)
         stamps = self._stamps(key)
 
         def arrive(query: zenoh.Query) -> None:
-            self._mailbox.put(
-                lambda: reply(query, key, question_type, handler, self._reader, stamps)
-            )
+            def work() -> None:
+                reply(query, key, question_type, handler, self._reader, stamps)
+
+            if aside is None:
+                self._mailbox.put(work)
+            else:
+                # What went wrong leaves `pump` as it does elsewhere.
+                aside.submit(work).add_done_callback(lambda done: self._mailbox.put(done.result))
 
         self._declared.append(self._session.declare_queryable(key, _on_thread(arrive)))
         self.answers.append(key)

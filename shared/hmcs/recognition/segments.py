@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +95,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
             if label is None:
                 continue
             labeled = True
+            state, gesteme = _meant(task, label, demonstration, samples.start)
             piece = demonstration.cut(samples.start, samples.stop)
             positions = piece.positions
             steps = tuple(steps_of_demonstration(piece, task.dead_zone_m))
@@ -104,7 +106,6 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
                     f"{_extent(positions):.4f} m and makes {len(steps)} steps, but 2 are "
                     f"needed: demonstrate it larger or lower dead_zone_m ({task.dead_zone_m})"
                 )
-            state, gesteme = _meant(task, label, demonstration.name)
             if own and samples.start == last:
                 own[-1] = own[-1]._replace(after=steps[0].displacement)
             own.append(
@@ -122,7 +123,8 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
         if not labeled:
             raise LearningError(
                 f"demonstration {demonstration.name!r} has no labels: add a column 'state' with "
-                f"one of {', '.join(state.name for state in task.states)}"
+                f"one of {', '.join(state.name for state in task.states)}; label a recording on "
+                "the page's timeline or with `hmcs label`; or train with --find-states"
             )
     return segments
 
@@ -133,10 +135,9 @@ def labeled_steps(task: Task, demonstration: Demonstration) -> LabeledSteps:
     Raises LearningError for a label that is no state of the task.
     """
     meant = {
-        label: _meant(task, label, demonstration.name)
-        for label in set(demonstration.states)
-        if label is not None
-    } | {None: (-1, -1)}
+        label: (-1, -1) if label is None else _meant(task, label, demonstration, samples.start)
+        for label, samples in demonstration.stretches
+    }
     zone, begin = DeadZone(task.dead_zone_m), 0
     steps, labels = [], []
     for end, position in enumerate(demonstration.positions):
@@ -157,25 +158,30 @@ def _row(values: Array | None, k: int) -> Array | None:
     return None if values is None else np.asarray(values[k])
 
 
-def _meant(task: Task, label: str, demonstration: str) -> tuple[int, int]:
-    """State and gesteme that a label names."""
+def _meant(task: Task, label: str, demonstration: Demonstration, sample: int) -> tuple[int, int]:
+    """State and gesteme that the label of a sample names."""
+    where = (
+        f"demonstration {demonstration.name!r}: label {label!r} "
+        f"at {demonstration.time_s[sample]:.2f} s"
+    )
     state_name, _, chosen = label.partition("/")
-    found = [q for q, state in enumerate(task.states) if state.name == state_name]
-    if not found:
+    names = [state.name for state in task.states]
+    if state_name not in names:
+        near = get_close_matches(state_name, names, n=1)
+        guess = f", did you mean {near[0]!r}?" if near else ""
         raise LearningError(
-            f"demonstration {demonstration!r}: label {label!r} is no state of task {task.name!r}; "
-            f"states are {', '.join(s.name for s in task.states)}"
+            f"{where} is no state of task {task.name!r}{guess} (states are {', '.join(names)})"
         )
-    state = task.states[found[0]]
+    index = names.index(state_name)
+    state = task.states[index]
     if not chosen and len(state.gestemes) == 1:
         chosen = state.gestemes[0]
     if chosen not in state.gestemes:
         raise LearningError(
-            f"demonstration {demonstration!r}: label {label!r} does not name one of the gestemes "
-            f"of state {state_name!r}; write "
+            f"{where} does not name one of the gestemes of state {state_name!r}; write "
             + " or ".join(f"{state_name}/{name}" for name in state.gestemes)
         )
-    return found[0], [gesteme.name for gesteme in task.gestemes].index(chosen)
+    return index, [gesteme.name for gesteme in task.gestemes].index(chosen)
 
 
 def _check(demonstration: Demonstration) -> None:

@@ -7,6 +7,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from hmcs.bus.counters import Sequences
+from hmcs.bus.messages import Message
+from hmcs.recordings.plain import BY_SCHEMA
 from hmcs.recordings.reading import RecordingContent
 
 
@@ -30,6 +32,27 @@ class Inspection(NamedTuple):
     channels: tuple[ChannelSummary, ...]
     problems: tuple[str, ...]
     """What is missing, a sentence each; none for a recording that is whole and without gaps."""
+
+
+class Loss(NamedTuple):
+    """Messages that are missing in a recording."""
+
+    at_s: float
+    """When the next one came, since the recording's first message."""
+    messages: int
+
+
+def losses_of(content: RecordingContent, message_type: type[Message]) -> tuple[Loss, ...]:
+    """Return where messages of a type are missing, in the order of time."""
+    sequences, found = Sequences(), []
+    for message in content.messages:
+        if message.schema.partition("/")[0] != message_type.SCHEMA:
+            continue
+        fields = message.fields
+        lost = sequences.note(message.key, fields["source"]["boot"], fields["seq"])
+        if lost:
+            found.append(Loss((message.log_ns - content.first_ns) / 1e9, lost))
+    return tuple(found)
 
 
 def inspected(content: RecordingContent) -> Inspection:
@@ -74,8 +97,14 @@ def _problems(content: RecordingContent, channels: tuple[ChannelSummary, ...]) -
         for channel in channels
         if channel.lost
     ]
-    schemas = {channel.schema.partition("/")[0] for channel in channels}
-    if "step" not in schemas:
+    schemas = {channel.schema for channel in channels}
+    version = content.metadata.get("hmcs", {}).get("version", "unknown")
+    problems += [
+        f"{schema} cannot be read: it is of another version of the contract; replay and train with "
+        f"version {version} of hmcs, which recorded it"
+        for schema in sorted(schemas - BY_SCHEMA.keys())
+    ]
+    if "step" not in {schema.partition("/")[0] for schema in schemas}:
         problems.append("there are no steps: the hand did not move, nothing can be replayed")
     if not content.attachments:
         problems.append("no model is kept with it: replay needs one by --model")

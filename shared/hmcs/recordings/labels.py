@@ -2,7 +2,8 @@
 
 Labels said while the hand moved are `Label` messages. Labels set afterwards stand in a CSV file
 beside the recording, `NAME.labels.csv` with the header `begin_s,end_s,state`, in seconds since the
-recording's first message; they count instead of those said. The recording is never changed.
+recording's first message; they count instead of those said. The recording is never changed. A line
+of that file that begins with # is a remark.
 """
 
 from __future__ import annotations
@@ -12,29 +13,29 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal
 
 from hmcs.bus.messages import Label, Step
+from hmcs.recordings.found import COMMENT, is_as_found, marked
 from hmcs.recordings.reading import RecordingContent, RecordingError
+from hmcs.recordings.stretches import NS_PER_S, Stretch, to_ns
 from hmcs.whole_files import written_whole
 
 HEADER = ["begin_s", "end_s", "state"]
-
-
-class Stretch(NamedTuple):
-    """A stretch of a recording that is one state of the task."""
-
-    begin_ns: int
-    """ns since 1970, as messages are logged."""
-    end_ns: int
-    """The first moment that is not in it."""
-    state: str
-    """A task state, or `state/gesteme`."""
+How = Literal["said meanwhile", "set afterwards", "found"]
 
 
 def labels_beside(recording: Path) -> Path:
     """Return where labels of a recording are written that are set afterwards."""
     return recording.with_name(f"{recording.stem}.labels.csv")
+
+
+def how_labeled(content: RecordingContent) -> How:
+    """Return how the labels of a recording were set, those that count."""
+    beside = labels_beside(content.path)
+    if not beside.is_file():
+        return "said meanwhile"
+    return "found" if is_as_found(beside) else "set afterwards"
 
 
 def labels_of(content: RecordingContent) -> tuple[Stretch, ...]:
@@ -44,8 +45,7 @@ def labels_of(content: RecordingContent) -> tuple[Stretch, ...]:
     """
     beside = labels_beside(content.path)
     if beside.is_file():
-        first_ns = content.messages[0].log_ns if content.messages else 0
-        return read_labels(beside, first_ns)
+        return read_labels(beside, content.first_ns)
     return _said(content)
 
 
@@ -63,7 +63,7 @@ def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
     if next(rows, []) != HEADER:
         raise RecordingError(f"{file}:1: expected the header {','.join(HEADER)}")
     for row in rows:
-        if not row:
+        if not row or row[0].startswith(COMMENT):
             continue
         where = f"{file}:{rows.line_num}"
         try:
@@ -73,7 +73,7 @@ def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
             raise RecordingError(f"{where}: expected {','.join(HEADER)}, not {row}") from None
         if not (math.isfinite(begin_s) and math.isfinite(end_s) and begin_s < end_s and state):
             raise RecordingError(f"{where}: expected begin_s below end_s, and a state")
-        stretch = Stretch(first_ns + round(begin_s * 1e9), first_ns + round(end_s * 1e9), state)
+        stretch = Stretch(first_ns + to_ns(begin_s), first_ns + to_ns(end_s), state)
         if stretches and stretch.begin_ns < stretches[-1].end_ns:
             raise RecordingError(
                 f"{where}: begins before the label above it ends: let each end where the next one "
@@ -83,17 +83,27 @@ def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
     return tuple(stretches)
 
 
-def write_labels(file: Path, stretches: Sequence[Stretch], first_ns: int) -> None:
-    """Write labels as `read_labels` reads them, whole or not at all."""
-    with (
-        written_whole(file) as unfinished,
-        unfinished.open("w", encoding="utf-8", newline="") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(HEADER)
-        for stretch in stretches:
-            begin_s, end_s = ((at - first_ns) / 1e9 for at in stretch[:2])
-            writer.writerow([f"{begin_s:.6f}", f"{end_s:.6f}", stretch.state])
+def write_labels(
+    file: Path, stretches: Sequence[Stretch], first_ns: int, *, found: bool = False
+) -> None:
+    """Write labels as `read_labels` reads them, to the ns, whole or not at all.
+
+    Those that were `found` carry a remark that says so.
+    """
+    rows = io.StringIO()
+    writer = csv.writer(rows, lineterminator="\n")
+    writer.writerow(HEADER)
+    for stretch in stretches:
+        times = (_seconds(at - first_ns) for at in (stretch.begin_ns, stretch.end_ns))
+        writer.writerow([*times, stretch.state])
+    text = rows.getvalue()
+    with written_whole(file) as unfinished:
+        unfinished.write_text(marked(text) if found else text, encoding="utf-8", newline="\n")
+
+
+def _seconds(ns: int) -> str:
+    """Seconds with as many digits as they need."""
+    return f"{ns / NS_PER_S:.9f}".rstrip("0").rstrip(".")
 
 
 def _said(content: RecordingContent) -> tuple[Stretch, ...]:

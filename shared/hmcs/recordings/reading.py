@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import zstandard
 from mcap.exceptions import McapError
@@ -82,29 +82,46 @@ class RecordingContent:
     """What stopped the reading; empty where nothing did."""
 
     @property
+    def first_ns(self) -> int:
+        """When its first message was logged; 0 where there is none."""
+        return self.messages[0].log_ns if self.messages else 0
+
+    @property
+    def last_ns(self) -> int:
+        """When its last message was logged; 0 where there is none."""
+        return self.messages[-1].log_ns if self.messages else 0
+
+    @property
     def duration_s(self) -> float:
         """From the first to the last message."""
-        if not self.messages:
-            return 0.0
-        return (self.messages[-1].log_ns - self.messages[0].log_ns) / 1e9
+        return (self.last_ns - self.first_ns) / 1e9
 
     def of(self, message_type: type[M]) -> Iterator[tuple[Recorded, Envelope, M]]:
         """Yield the messages of a type.
 
         Raises RecordingError where they are of another version of the contract.
         """
-        wanted = schema_of(message_type)
+        for recorded, envelope, message in self.of_any(message_type):
+            yield recorded, envelope, cast(M, message)
+
+    def of_any(
+        self, *message_types: type[BusMessage]
+    ) -> Iterator[tuple[Recorded, Envelope, BusMessage]]:
+        """Yield the messages of several types in the order they came; raises as `of` does."""
+        types = {schema_of(message_type): message_type for message_type in message_types}
+        wanted = {message_type.SCHEMA: schema for schema, message_type in types.items()}
         for recorded in self.messages:
-            if recorded.schema == wanted:
+            if recorded.schema in types:
                 try:
-                    yield recorded, *message_of(message_type, recorded.text)
+                    envelope, message = message_of(types[recorded.schema], recorded.text)
                 except NoMessageError as error:
                     raise RecordingError(f"{self.path}: {error}: the file is damaged") from error
-            elif recorded.schema.partition("/")[0] == message_type.SCHEMA:
+                yield recorded, envelope, message
+            elif (name := recorded.schema.partition("/")[0]) in wanted:
                 raise RecordingError(
-                    f"{self.path}: has {recorded.schema}, expected {wanted}: it was recorded with "
-                    f"version {self.metadata.get('hmcs', {}).get('version', 'unknown')} of hmcs; "
-                    "read it with that one"
+                    f"{self.path}: has {recorded.schema}, expected {wanted[name]}: it was recorded "
+                    f"with version {self.metadata.get('hmcs', {}).get('version', 'unknown')} of "
+                    "hmcs; read it with that one"
                 )
 
 

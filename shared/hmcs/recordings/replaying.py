@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple, cast
-
-import numpy as np
 
 from hmcs.bus.messages import Belief, Evidence, Step
 from hmcs.recognition.layered import LayeredRecognizer, Layers, Precision
@@ -17,13 +15,10 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.recognizer import Guarded, Recognizer
 from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recognition.scoring import changes
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import RecordingContent, RecordingError
+from hmcs.recordings.stretches import Stretch
 from hmcs.translation import belief_message, step_of
-
-COMPARED = ("probabilities", "unknown", "log_likelihood", "mean_log_likelihood", "segment_start")
-"""What makes two beliefs the same, bit by bit."""
 
 
 class Believed(NamedTuple):
@@ -32,6 +27,8 @@ class Believed(NamedTuple):
     log_ns: int
     clock: str
     step: int
+    sample: int | None
+    """Number of the operator's sample that completed the step; None where it is not told."""
     replayed: Belief
     recorded: Belief | None
     """Of the recognizer compared with; None where it said nothing of this step."""
@@ -50,45 +47,26 @@ class Replay(NamedTuple):
     """Processor time."""
     lasted_s: float
     """From the first to the last step, as recorded."""
-    first_step: int
-    """Of the recording; what a recognizer knew of those before it is not in it."""
+    notes: tuple[str, ...]
+    """What is to be known besides, a sentence each."""
 
 
-class Comparison(NamedTuple):
-    """Two recognizers side by side."""
+def kept_model(content: RecordingContent) -> Model:
+    """Return the model that is kept with a recording; of several the one the fixture followed.
 
-    steps: int
-    compared: int
-    """Steps both said something of, with all evidence."""
-    same_bits: int
-    """Of those, with the very same belief; only the same model can have them."""
-    agreement: float
-    """Share of the compared steps with the same likely state; NaN where there is none."""
-    later_steps: float
-    """Median of how much later than the recorded one the replayed changes to the same state."""
-    replayed_right: float
-    """Share of the labeled steps that are right; NaN where the recording has no labels."""
-    recorded_right: float
-    times_real: float
-    """How many times as fast as it happened."""
-
-
-def kept_model(content: RecordingContent, name: str = "") -> Model:
-    """Return the model that is kept with a recording, of that name where there are several.
-
-    Raises RecordingError where there is none, or not of that name.
+    Raises RecordingError where there is none, or nobody knows which.
     """
     kept = [file for file in content.attachments if file.endswith(".hmcs")]
-    wanted = f"{name}.hmcs" if name else (kept[0] if len(kept) == 1 else "")
-    if wanted not in kept:
+    followed = {f"{facts.get('active_model', '')}.hmcs" for facts in content.metadata.values()}
+    wanted = kept if len(kept) == 1 else [file for file in kept if file in followed]
+    if len(wanted) != 1:
         there = ", ".join(kept) or "none"
         raise RecordingError(
-            f"{content.path}: kept with it are the models: {there}; name one of another place "
-            "with --model FILE"
+            f"{content.path}: kept with it are the models: {there}; name one with --model FILE"
         )
     with TemporaryDirectory() as folder:
-        file = Path(folder) / wanted
-        file.write_bytes(content.attachments[wanted])
+        file = Path(folder) / wanted[0]
+        file.write_bytes(content.attachments[wanted[0]])
         return load_model(file)
 
 
@@ -98,7 +76,8 @@ def replayed(
     """Return what a model's recognizer believes of a recording; `progress` is told the share done.
 
     Where the recording has evidence of this very model, evidence is rounded as it was on its way.
-    Raises RecordingError where there are no steps.
+    Raises RecordingError where there are no steps, and where labels and recorded beliefs speak of
+    no state the model knows.
     """
     steps = list(content.of(Step))
     if not steps:
@@ -108,14 +87,20 @@ def replayed(
     name, recorded = _recorded(content, model)
     precision = _precision(content, model)
     labels = labels_of(content)
+    strangers = _strangers(content, model, recorded, labels)
     beliefs: list[Believed] = []
     clock, recognizer, expected, label = "", None, -1, 0
+    anew, missing = 0, 0
     began_s = time.process_time()
     for number, (logged, envelope, step) in enumerate(steps):
         if envelope.source.boot == clock and step.index < expected:
             # It stands there twice: among the steps made before, and as it came.
             continue
         if recognizer is None or envelope.source.boot != clock or step.index != expected:
+            if recognizer is not None and envelope.source.boot != clock:
+                anew += 1
+            elif recognizer is not None:
+                missing += step.index - expected
             clock = envelope.source.boot
             recognizer = _recognizer(model, step.index > 0, precision)
         expected = step.index + 1
@@ -128,49 +113,64 @@ def replayed(
                 logged.log_ns,
                 clock,
                 step.index,
+                None if envelope.origin is None else envelope.origin.seq,
                 belief_message(model, recognition, clock),
                 recorded.get((clock, step.index)),
-                labels[label].state.partition("/")[0] if labeled else None,
+                _state_of(labels[label]) if labeled else None,
             )
         )
         progress((number + 1) / len(steps))
     spent_s = time.process_time() - began_s
     lasted_s = (steps[-1][0].log_ns - steps[0][0].log_ns) / 1e9
-    return Replay(model, name, tuple(beliefs), spent_s, lasted_s, steps[0][2].index)
+    notes = (*strangers, *_interruptions(steps[0][2].index, missing, anew))
+    return Replay(model, name, tuple(beliefs), spent_s, lasted_s, notes)
 
 
-def compared(replay: Replay) -> Comparison:
-    """Return how a replay stands to what was recorded, and both to the labels."""
-    pairs = [
-        (believed.replayed, believed.recorded)
-        for believed in replay.beliefs
-        if believed.recorded is not None and not believed.recorded.missing_gestemes
+def _interruptions(first_step: int, missing: int, anew: int) -> Iterator[str]:
+    if first_step:
+        yield (
+            f"it begins with step {first_step}: what was known from the steps before is not in it, "
+            "so that beliefs may differ"
+        )
+    if missing:
+        yield (
+            f"{missing} steps are missing: recognition begins anew after each gap, so that beliefs "
+            "may differ"
+        )
+    if anew:
+        yield f"the input device was started anew, or another took over, {anew} times"
+
+
+def _strangers(
+    content: RecordingContent,
+    model: Model,
+    recorded: Mapping[tuple[str, int], Belief],
+    labels: Sequence[Stretch],
+) -> list[str]:
+    """What to tell of states the model does not know; RecordingError where it knows none."""
+    said = {
+        "the labels": {_state_of(label) for label in labels},
+        "the recorded beliefs": {state for b in recorded.values() for state in b.states},
+    }
+    known = set(model.state_names)
+    if any(said.values()) and not any(states & known for states in said.values()):
+        there = ", ".join(sorted(set().union(*said.values())))
+        raise RecordingError(
+            f"{content.path}: is of another task than model {model.name!r}: its states are "
+            f"{there}; those of task {model.task.name!r} are {', '.join(model.state_names)}: "
+            "choose a model of its task"
+        )
+    return [
+        f"{who} name states that task {model.task.name!r} of model {model.name!r} has not: "
+        f"{', '.join(sorted(states - known))}: the task was changed, or is another one"
+        for who, states in said.items()
+        if states - known
     ]
-    alike = [now.likely_state == then.likely_state for now, then in pairs]
-    labeled = [believed for believed in replay.beliefs if believed.label is not None]
-    right = [believed.replayed.likely_state == believed.label for believed in labeled]
-    was_right = [
-        believed.recorded.likely_state == believed.label
-        for believed in labeled
-        if believed.recorded is not None
-    ]
-    return Comparison(
-        len(replay.beliefs),
-        len(pairs),
-        sum(same_bits(now, then) for now, then in pairs),
-        _mean(alike),
-        _later_steps(pairs),
-        _mean(right),
-        _mean(was_right),
-        replay.lasted_s / max(replay.spent_s, 1e-9),
-    )
 
 
-def same_bits(one: Belief, other: Belief) -> bool:
-    """Return whether two beliefs are of one model and the same to the last bit."""
-    return one.model_hash == other.model_hash and all(
-        np.array_equal(getattr(one, name), getattr(other, name)) for name in COMPARED
-    )
+def _state_of(label: Stretch) -> str:
+    """The state a label tells, without the gesteme it may name besides."""
+    return label.state.partition("/")[0]
 
 
 def _recognizer(model: Model, anywhere: bool, precision: Precision) -> Recognizer:
@@ -205,35 +205,3 @@ def _precision(content: RecordingContent, model: Model) -> Precision:
             said = json.loads(facts["settings"]).get("precision", "float32")
             return cast(Precision, said)
     return "float32"
-
-
-def _later_steps(pairs: list[tuple[Belief, Belief]]) -> float:
-    names = sorted({state for pair in pairs for belief in pair for state in belief.states})
-    now, then = ([names.index(pair[side].likely_state) for pair in pairs] for side in (0, 1))
-    later = []
-    for at in changes(then):
-        near = [t - at for t in changes(now) if now[t] == then[at]]
-        if near:
-            later.append(min(near, key=abs))
-    return float(np.median(later)) if later else float("nan")
-
-
-def _mean(truths: list[bool]) -> float:
-    return float(np.mean(truths)) if truths else float("nan")
-
-
-def rows_of(replay: Replay) -> Iterator[dict[str, object]]:
-    """Yield a row for every step: what is and was believed, and how surely."""
-    first_ns = replay.beliefs[0].log_ns if replay.beliefs else 0
-    for believed in replay.beliefs:
-        then = believed.recorded
-        yield {
-            "time_s": (believed.log_ns - first_ns) / 1e9,
-            "step": believed.step,
-            "label": believed.label or "",
-            "recorded_state": "" if then is None else then.likely_state,
-            "recorded_probability": "" if then is None else then.confidence,
-            "replayed_state": believed.replayed.likely_state,
-            "replayed_probability": believed.replayed.confidence,
-            "replayed_unknown": believed.replayed.unknown,
-        }

@@ -274,7 +274,7 @@ def test_path_error_does_not_go_back_where_a_path_turns_close_beside_itself() ->
     assert errors[-1] == pytest.approx(0.006, abs=1e-4)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(*[st.floats(-0.02, 0.02)] * 3), min_size=1, max_size=5))
 def test_matching_is_the_best_monotone_one(displacements: list[tuple[float, ...]]) -> None:
     path = Path(np.array([[0, 0, 0], [0.003, 0, 0], [0.003, 0.002, 0]]))

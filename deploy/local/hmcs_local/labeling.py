@@ -1,0 +1,98 @@
+"""`hmcs label`: which part of the task each moment of a recording was, shown and set."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from hmcs.errors import UserError
+from hmcs.recordings.labels import how_labeled, labels_beside, labels_of, write_labels
+from hmcs.recordings.reading import RecordingContent, read
+from hmcs.recordings.stretches import (
+    NS_PER_S,
+    Stretch,
+    check_within,
+    of_seconds,
+    relabeled,
+    told,
+)
+from hmcs.task import Task
+from hmcs.task.model import unknown
+
+_SET = re.compile(
+    r"\s*(?P<begin>\d+(?:\.\d*)?|\.\d+)\s*[-–]\s*(?P<end>\d+(?:\.\d*)?|\.\d+)\s*=(?P<state>.*)"
+)
+
+
+def label_recording(
+    file: Path, sets: Sequence[str], *, clear: bool, task: Task | None, console: Console
+) -> None:
+    """Set labels of a recording, where any are given, and show those that count now.
+
+    Each of `sets` is BEGIN-END=STATE in seconds. Raises UserError for one that is none, or is not
+    within the recording, and with `task` for any label that is no state of it; nothing is written
+    then.
+    """
+    content = read(file)
+    labels: Iterable[Stretch] = () if clear else labels_of(content)
+    for item in sets:
+        new = _stretch(item, content)
+        labels = relabeled(labels, new)
+    labels = tuple(labels)
+    if task is not None:
+        _check_names(task, labels, content)
+    if sets or clear:
+        write_labels(labels_beside(file), labels, content.first_ns)
+    _show(content, labels, console)
+
+
+def _stretch(item: str, content: RecordingContent) -> Stretch:
+    match = _SET.fullmatch(item)
+    if match is None:
+        raise UserError(f"--set {item}: write BEGIN-END=STATE in seconds, e.g. 1.2-3.9=take")
+    (stretch,) = of_seconds(
+        [float(match["begin"])], [float(match["end"])], [match["state"]], content.first_ns
+    )
+    check_within([stretch], content.first_ns, content.last_ns)
+    return stretch
+
+
+def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingContent) -> None:
+    known = {
+        name
+        for state in task.states
+        for name in (
+            *([state.name] if len(state.gestemes) == 1 else []),
+            *(f"{state.name}/{gesteme}" for gesteme in state.gestemes),
+        )
+    }
+    wrong = [label for label in labels if label.state not in known]
+    if wrong:
+        raise UserError(
+            "\n".join(
+                f"{content.path}: {told(label, content.first_ns)}: "
+                f"{unknown(f'state of task {task.name}', label.state, known)}"
+                for label in wrong
+            )
+        )
+
+
+def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console) -> None:
+    title = f"{content.path.name}: {content.duration_s:.1f} s"
+    if not labels:
+        console.print(f"{title}, no labels: set one by --set BEGIN-END=STATE")
+        return
+    table = Table(title=title, title_justify="left")
+    table.add_column("from, s", justify="right")
+    table.add_column("to, s", justify="right")
+    table.add_column("state")
+    table.add_column("how")
+    how = how_labeled(content)
+    for label in labels:
+        begin_s, end_s = ((at - content.first_ns) / NS_PER_S for at in label[:2])
+        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", label.state, how)
+    console.print(table)

@@ -1,0 +1,41 @@
+"""What should be known of a recording before anything is learned from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hmcs.bus.messages import Motion
+from hmcs.recordings.inspection import losses_of
+from hmcs.recordings.reading import RecordingContent
+from hmcs.task import Task
+from hmcs_trainer.validation import Finding
+
+_WITH_A_TASK = ("input_device/", "robot/")
+"""What the metadata of whoever works on a task begins with."""
+
+
+def recording_findings(task: Task, content: RecordingContent) -> Iterator[Finding]:
+    """Yield what may be wrong with a recording: its end, what was lost, whose task it was."""
+    name = content.path.name
+    tasks = {
+        facts["task"]
+        for member, facts in content.metadata.items()
+        if member.startswith(_WITH_A_TASK) and facts.get("task")
+    }
+    for other in sorted(tasks - {task.name}):
+        yield Finding(
+            False,
+            f"{name}: was recorded with task {other!r}, not {task.name!r}: see that its labels and "
+            "its workspace are those of the task you train for",
+        )
+    losses = losses_of(content, Motion)
+    if losses:
+        first = losses[0]
+        yield Finding(
+            False,
+            f"{name}: {sum(loss.messages for loss in losses)} samples of the hand were lost, the "
+            f"first {first.messages} of them before {first.at_s:.2f} s: the way is straight there; "
+            "leave it out, if that was not meant",
+        )
+    if not content.whole:
+        yield Finding(False, f"{name}: it was cut off: what came in its last moments is missing")

@@ -1,0 +1,268 @@
+"""What the fixture would have done in a recording: its controller again, with other beliefs.
+
+An open loop: hand and robot are where they were recorded to be, and react to nothing that the
+fixture would have done otherwise. What it does in the first moments tells this best; the longer it
+leads another way than it did then, the less would hand and robot have been where they were.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.bus.counters import Sequences
+from hmcs.bus.messages import (
+    Belief,
+    Envelope,
+    FixtureState,
+    Message,
+    Motion,
+    RobotState,
+    Step,
+)
+from hmcs.fixtures.controller import Controller, Fixture
+from hmcs.fixtures.driver import Driver
+from hmcs.fixtures.rules import Safeguards
+from hmcs.recordings.reading import Recorded, RecordingContent
+from hmcs.recordings.replaying import Replay
+from hmcs.translation import guides_of, sample_of, segment_belief_of
+
+HEARD = (Motion, Step, Belief, RobotState, FixtureState)
+CONTROLLER = "fixture_controller/"
+"""What the metadata of fixture controllers are named by."""
+
+
+class Did(NamedTuple):
+    """What a fixture does, or did, at one sample of the operator."""
+
+    state: str
+    """The task state whose fixture is applied; empty in free motion."""
+    reason: str
+    factor: float
+    """k, ½ in free motion."""
+    compliance: float
+    direction: NDArray[np.float64]
+    """The preferred one, unit length, or zero in free motion, shape (3,)."""
+    velocity: NDArray[np.float64]
+    """Commanded, m/s, shape (3,)."""
+    off_guide_m: float | None
+    """How far the robot is beside the guide; None where nobody knows."""
+    engaged: bool
+
+    @property
+    def guides(self) -> bool:
+        """Whether it is stiffer than free motion."""
+        return bool(self.state)
+
+
+class Tick(NamedTuple):
+    """One sample of the operator, and what is and was done with it."""
+
+    log_ns: int
+    device: str
+    """Boot of the input device."""
+    sample: int
+    """Its number."""
+    now: Did
+    then: Did | None
+    """None where no fixture was recorded to have answered it."""
+
+
+class Guided(NamedTuple):
+    """A recording through a fixture controller."""
+
+    followed: tuple[str, ...]
+    """The models the recorded fixture followed, each once, in their order."""
+    ticks: tuple[Tick, ...]
+    spent_s: float
+    """Processor time."""
+    notes: tuple[str, ...]
+    """What is to be known besides, a sentence each."""
+
+
+def guided(
+    content: RecordingContent, replay: Replay, progress: Callable[[float], None] = lambda _: None
+) -> Guided:
+    """Return what the fixture does in a recording with the beliefs of a replay of it.
+
+    Every sample, step and position of the robot comes when it was recorded; a belief comes when the
+    recorded one of its step came, or with its step where there was none. Rules and guides are those
+    of the replayed model, safeguards those of the recorded fixture controller. `progress` is told
+    the share done. Raises RecordingError where messages are of another version of the contract, and
+    RegionError for a forbidden region that cannot be.
+    """
+    began_s = time.process_time()
+    settings, active = _controller_told(content)
+    again = _Again(replay, Safeguards() if settings is None else safeguards_told(settings), active)
+    then: dict[tuple[str, int], FixtureState] = {}
+    begun_ns = content.messages[0].log_ns if content.messages else 0
+    lasts_ns = max(round(content.duration_s * 1e9), 1)
+    for recorded, envelope, message in content.of_any(*HEARD):
+        if isinstance(message, FixtureState) and envelope.origin is not None:
+            then[envelope.origin.boot, envelope.origin.seq] = message
+            continue
+        again.hear((recorded.log_ns - begun_ns) / 1e9, recorded, envelope, message)
+        progress((recorded.log_ns - begun_ns) / lasts_ns)
+    ticks = tuple(
+        tick if told is None else tick._replace(then=_did(told))
+        for tick in again.ticks
+        for told in [then.get((tick.device, tick.sample))]
+    )
+    followed = tuple(dict.fromkeys(told.model for told in then.values() if told.model))
+    notes = _notes(again, settings is not None, bool(then), followed, replay.compared_with)
+    return Guided(followed, ticks, time.process_time() - began_s, tuple(notes))
+
+
+def safeguards_told(settings: Mapping[str, Any]) -> Safeguards:
+    """Return the safeguards in a fixture controller's settings, as it reports them.
+
+    What they do not tell, or not as a number, is as by default.
+    """
+    told: dict[str, float] = {}
+    for name in Safeguards.__dataclass_fields__:
+        milliseconds = settings.get(f"{name.removesuffix('_s')}_ms") if name[-2:] == "_s" else None
+        value = settings.get(name) if milliseconds is None else milliseconds
+        if isinstance(value, int | float):
+            told[name] = value if milliseconds is None else value / 1e3
+    return Safeguards(**told)
+
+
+class _Again:
+    """A controller that hears what the recorded one heard, as its service lets it.
+
+    Nobody waits for samples that stay out: the first one after a gap finds it long enough to stop.
+    """
+
+    def __init__(self, replay: Replay, safeguards: Safeguards, active: bool) -> None:
+        model = replay.model
+        self.ticks: list[Tick] = []
+        """Without what was done then."""
+        self.lost = self.refused = self.robots = 0
+        self._controller = Controller(safeguards)
+        self._controller.load(model.name, guides_of(model))
+        if active:
+            self._controller.activate(model.name)
+        self._name, self._recorded_name = model.name, replay.compared_with
+        self._driver = Driver(safeguards.input_stale_after_s)
+        self._sequences = Sequences()
+        self._clock, self._next_step = "", 0
+        self._beliefs = {(each.clock, each.step): each for each in replay.beliefs}
+
+    def hear(self, now_s: float, recorded: Recorded, envelope: Envelope, message: Message) -> None:
+        """Take in a recorded message at its time."""
+        match message:
+            case Motion():
+                self._sampled(now_s, recorded, envelope, message)
+            case Step():
+                self._stepped(now_s, envelope, message)
+            case RobotState():
+                self.robots += 1
+                place, turned = message.tool_position, message.tool_orientation
+                self._controller.robot_moved(now_s, place, turned)
+            case Belief() if recorded.key.split("/")[-2] == self._recorded_name:
+                self._believed(message.clock, message.step)
+
+    def _sampled(
+        self, now_s: float, recorded: Recorded, envelope: Envelope, motion: Motion
+    ) -> None:
+        boot, number = envelope.source.boot, envelope.seq
+        self.lost += self._sequences.note(recorded.key, boot, number) or 0
+        if self._driver.heard(now_s, boot, number) != "accepted":
+            self.refused += 1
+            return
+        self._follow(boot)
+        made = self._controller.sampled(now_s, sample_of(motion, number))
+        self.ticks.append(Tick(recorded.log_ns, boot, number, _would_do(made), None))
+
+    def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
+        """Take a step, and the belief after it where none was recorded that says when it came."""
+        boot = envelope.source.boot
+        if boot != self._clock and self._clock and not self._driver.admits(now_s, boot):
+            return
+        self._follow(boot)
+        if step.index < self._next_step:
+            return
+        self._next_step = step.index + 1
+        number = None if envelope.origin is None else envelope.origin.seq
+        self._controller.stepped(now_s, step.index, step.position, step.displacement, number)
+        believed = self._beliefs.get((boot, step.index))
+        if believed is not None and believed.recorded is None:
+            self._believed(boot, step.index)
+
+    def _believed(self, clock: str, step: int) -> None:
+        """Take the replayed belief of a step."""
+        believed = self._beliefs.get((clock, step))
+        if believed is None or clock != self._clock:
+            return
+        self._controller.believed(self._name, segment_belief_of(believed.replayed))
+        if not self._controller.active:
+            self._controller.activate(self._name)
+
+    def _follow(self, boot: str) -> None:
+        if boot != self._clock:
+            self._clock, self._next_step = boot, 0
+            self._controller.forget()
+
+
+def _notes(
+    again: _Again, settings_known: bool, recorded: bool, followed: tuple[str, ...], other: str
+) -> Iterator[str]:
+    if not again.ticks:
+        yield "no sample of the operator's device was recorded: the fixture does nothing"
+    if not recorded:
+        yield "no fixture was recorded: there is nothing to compare with"
+    elif followed and set(followed) != {other}:
+        yield (
+            f"the recorded fixture followed {', then '.join(followed)}; the beliefs compared with "
+            f"are those of {other or 'nobody'}"
+        )
+    if not settings_known:
+        yield "the settings of the recorded fixture are not kept with it: defaults are used"
+    if not again.robots:
+        yield (
+            "no robot was recorded: nobody knows how far it was beside its guides, so that nothing "
+            "leads it back to them"
+        )
+    if again.lost:
+        yield f"{again.lost} samples of the operator's device are missing"
+    if again.refused:
+        yield f"{again.refused} samples came again or from a second input device: left out"
+
+
+def _controller_told(content: RecordingContent) -> tuple[Mapping[str, Any] | None, bool]:
+    """The settings of the recorded fixture controller, and whether it followed a model already."""
+    for name, facts in content.metadata.items():
+        if name.startswith(CONTROLLER) and "settings" in facts:
+            return json.loads(facts["settings"]), bool(facts.get("active_model"))
+    return None, False
+
+
+def _would_do(fixture: Fixture) -> Did:
+    return Did(
+        fixture.state,
+        fixture.reason,
+        fixture.factor,
+        fixture.gains.compliance,
+        fixture.direction,
+        fixture.command_twist[:3],
+        fixture.off_guide_m,
+        fixture.engaged,
+    )
+
+
+def _did(told: FixtureState) -> Did:
+    return Did(
+        told.state,
+        told.reason,
+        told.factor,
+        told.compliance,
+        told.preferred_direction,
+        told.command_twist[:3],
+        told.off_guide_m,
+        told.engaged,
+    )
