@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -52,13 +53,13 @@ def measure(span_s: float) -> list[Figure]:
         stack.until_ready(*services)
         stack.until(lambda: any(r.body.stop == "none" for r in states))
         processes = [stack.router, *services]
-        before, began_s = _cpu_s(processes), time.monotonic()
+        before, began_s = cpu_s(processes), time.monotonic()
         states.clear()
         while time.monotonic() - began_s < span_s:
             bus.pump(0.1)
         spent = [
             (after - first) / (time.monotonic() - began_s)
-            for after, first in zip(_cpu_s(processes), before, strict=True)
+            for after, first in zip(cpu_s(processes), before, strict=True)
         ]
     errors = _tracking_errors_m_s(states)
     return [
@@ -105,7 +106,8 @@ def _circle(folder: Path) -> Path:
     return path
 
 
-def _cpu_s(processes: list[StackProcess]) -> list[float]:
+def cpu_s(processes: Sequence[StackProcess]) -> list[float]:
+    """Return the processor time each has used so far, s."""
     times = [psutil.Process(process.pid).cpu_times() for process in processes]
     return [each.user + each.system for each in times]
 

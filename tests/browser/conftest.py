@@ -26,7 +26,7 @@ FLAGS = (
     "--disable-renderer-backgrounding",
 )
 PATIENT_MS = 400
-OPERATED = (
+FOLLOWING = (
     # A browser without graphics hardware leaves them little of the machine; whether they stop in
     # time for one another is for other tests to show.
     ("robot", "--task", TASK, "--hang-s", PATIENT_MS / 1e3),
@@ -34,8 +34,8 @@ OPERATED = (
         "fixture_controller",
         *("--input-stale-after-ms", PATIENT_MS, "--command-valid-for-ms", PATIENT_MS),
     ),
-    ("input_device", "--source", "page", "--task", TASK),
 )
+OPERATED = (*FOLLOWING, ("input_device", "--source", "page", "--task", TASK))
 
 OpenViewer = Callable[..., Viewer]
 
@@ -76,6 +76,15 @@ def open_viewer(browser: Any, request: pytest.FixtureRequest) -> Iterator[OpenVi
             viewer.keep_picture(name if len(viewers) == 1 else f"{name}-{number}")
         with contextlib.suppress(Exception):
             viewer.close()
+
+
+@pytest.fixture
+def following(browser: Any, stack: Stack) -> Cell:
+    """A robot that follows whatever device there will be."""
+    del browser  # Without one no process needs to be started.
+    cell = Cell(stack, *FOLLOWING)
+    stack.until(lambda: cell.heard.robot)
+    return cell
 
 
 @pytest.fixture

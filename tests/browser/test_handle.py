@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from browser.viewing import Cell, Viewer, speed_of
+from browser.viewing import LEFT, TASK, UP, Cell, Viewer, speed_of
+from hmcs.bus.messages import Motion
 
 pytestmark = pytest.mark.browser
 OpenViewer = Callable[..., Viewer]
@@ -96,3 +98,72 @@ def test_a_page_closed_in_mid_motion_lets_the_robot_stand_in_time(
     # How long a browser takes to close a page is its own affair; it may tell late that it has.
     assert (stood_ns - min(closed_ns, released_ns)) * 1e-9 <= STANDS_WITHIN_S
     assert heard.robot[-1][1].stop != "none"
+
+
+def circling(file: Path) -> Path:
+    """Write down a hand that goes round in circles for longer than anybody waits."""
+    times_s = np.arange(0.0, 120.0, 0.02)
+    circle = 0.08 * np.stack([0.0 * times_s, np.cos(times_s), np.sin(times_s)], axis=1)
+    rows = np.column_stack([times_s, circle])
+    np.savetxt(file, rows, delimiter=",", header="time_s,x_m,y_m,z_m", comments="")
+    return file
+
+
+def test_stop_on_a_page_stops_a_robot_that_another_device_drives(
+    following: Cell, open_viewer: OpenViewer, tmp_path: Path
+) -> None:
+    viewer, heard, stack = open_viewer(following), following.heard, following.stack
+    held: list[bool] = []
+    bus = following.bus
+    bus.subscribe(Motion, bus.keys.motion, lambda got: held.append(got.body.dead_man))
+    file = circling(tmp_path / "circles.csv")
+    stack.bring_up(
+        "input_device",
+        "pad",
+        *("--source", "recorded", "--demonstration", file, "--task", TASK, "--lead-in-s", 0.5),
+    )
+    stack.until(lambda: heard.speed > MOVING_M_S)
+    viewer.press("Stop")
+    stack.until(lambda: heard.robot[-1][1].stop == "asked")
+    until_stands(following)
+    viewer.until(lambda: viewer.sees("stands until the operator lets go and takes hold again"))
+    stood, count = heard.tool.copy(), len(held)
+    stack.elapse(1.0)
+    # The device goes on as if nothing had been.
+    assert len(held) > count + 20
+    assert all(held[count:])
+    assert np.linalg.norm(heard.tool - stood) < 1e-3
+    assert heard.robot[-1][1].stop == "asked"
+
+
+def test_a_handle_kept_to_a_plane_moves_the_tool_within_it_only(
+    operated: Cell, open_viewer: OpenViewer
+) -> None:
+    viewer, heard, stack = open_viewer(operated), operated.heard, operated.stack
+    viewer.choose("Keep to", "plane x y")
+    began = heard.tool.copy()
+    viewer.drag(
+        lambda: heard.held and heard.tool[1] - began[1] > LIFTED_M / 2, LIFTED_M, 8, along=LEFT
+    )
+    viewer.let_go()
+    stack.until(lambda: not heard.held)
+    until_stands(operated)
+    assert abs(heard.tool[2] - began[2]) < 1e-3
+    # Where the arrow out of the plane was there is none any more.
+    told = len(heard.handles)
+    foot = viewer.reach_for_handle(UP)
+    for share in (0.5, 1.0):
+        viewer.lift_to(foot, share * LIFTED_M)
+        stack.elapse(0.2)
+    viewer.let_go()
+    assert len(heard.handles) == told
+    # In another plane there is, and scaled it leads half as far.
+    viewer.choose("Keep to", "plane x z")
+    viewer.write("Scale", "0.5")
+    began = heard.tool.copy()
+    viewer.drag(lambda: heard.held and heard.tool[2] - began[2] > LIFTED_M / 4, LIFTED_M, moves=8)
+    stack.until(lambda: heard.speed < STANDING_M_S)
+    viewer.let_go()
+    stack.until(lambda: not heard.held)
+    assert abs(heard.tool[2] - began[2] - LIFTED_M / 2) < 0.015
+    assert abs(heard.tool[1] - began[1]) < 1e-3

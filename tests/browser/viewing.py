@@ -33,6 +33,7 @@ MANY_COLORS = 300
 GRIP_M = 0.13
 """Where an arrow of the handle is held, from its foot."""
 UP = np.array([0.0, 0.0, 1.0])
+LEFT = np.array([0.0, 1.0, 0.0])
 
 SLOW = ("--rate-hz", 5, "--lease-s", 1.0)
 """A page without graphics hardware draws few frames a second, and answers as seldom."""
@@ -135,7 +136,7 @@ class Viewer:
             self.cell.stack.elapse(_LOOK_S)
         return value
 
-    def sees(self, text: str) -> bool:
+    def sees(self, text: str | re.Pattern[str]) -> bool:
         """Whether a text can be read on the page now."""
         found = self.page.get_by_text(text)
         return any(found.nth(k).is_visible() for k in range(found.count()))
@@ -178,24 +179,37 @@ class Viewer:
 
     def write(self, label: str, text: str) -> None:
         """Write into a field."""
+        self._field(label).fill(text)
+
+    def written(self, label: str) -> str:
+        """Return what stands in a field."""
+        return str(self._field(label).input_value())
+
+    def _field(self, label: str) -> Any:
         words = self.page.locator("label").filter(has_text=re.compile(f"^{label}$"), visible=True)
         # The label is not tied to its field.
-        words.locator("xpath=ancestor::div[.//input][1]//input").fill(text)
+        found = words.locator("xpath=ancestor::div[.//input][1]//input")
+        return found.filter(visible=True).first
 
-    def reach_for_handle(self) -> NDArray[np.float64]:
-        """Press the mouse on the upward arrow of the handle; return where the handle's foot is."""
+    def choose(self, label: str, option: str) -> None:
+        """Take one of what a field offers."""
+        self._field(label).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def reach_for_handle(self, along: NDArray[np.float64] = UP) -> NDArray[np.float64]:
+        """Press the mouse on an arrow of the handle; return where the handle's foot is."""
         # Without anybody on the handle it stands at the tool.
         foot = self.cell.heard.tool.copy()
-        self.page.mouse.move(*self.place_of(foot + (GRIP_M - 0.01) * UP))
-        self.page.mouse.move(*self.place_of(foot + GRIP_M * UP))
+        self.page.mouse.move(*self.place_of(foot + (GRIP_M - 0.01) * along))
+        self.page.mouse.move(*self.place_of(foot + GRIP_M * along))
         self.page.mouse.down()
         return foot
 
-    def grab(self) -> NDArray[np.float64]:
+    def grab(self, along: NDArray[np.float64] = UP) -> NDArray[np.float64]:
         """Take hold of the handle, with another try where it is not drawn yet; return its foot."""
         heard, deadline_s = self.cell.heard, time.monotonic() + PAGE_S
         while True:
-            foot = self.reach_for_handle()
+            foot = self.reach_for_handle(along)
             until_s = time.monotonic() + _GRAB_S
             while time.monotonic() < until_s:
                 self.cell.stack.pump()
@@ -204,12 +218,18 @@ class Viewer:
             self.page.mouse.up()
             assert time.monotonic() < deadline_s, "the handle cannot be grabbed"
 
-    def lift_to(self, foot: NDArray[np.float64], height_m: float) -> None:
+    def lift_to(
+        self, foot: NDArray[np.float64], height_m: float, along: NDArray[np.float64] = UP
+    ) -> None:
         """Move the mouse so that the held handle stands so far above where its foot was."""
-        self.page.mouse.move(*self.place_of(foot + (GRIP_M + height_m) * UP))
+        self.page.mouse.move(*self.place_of(foot + (GRIP_M + height_m) * along))
 
     def drag(
-        self, condition: Callable[[], Any], height_m: float, moves: int
+        self,
+        condition: Callable[[], Any],
+        height_m: float,
+        moves: int,
+        along: NDArray[np.float64] = UP,
     ) -> NDArray[np.float64]:
         """Lift the handle in so many moves until `condition` is true; return where its foot was.
 
@@ -218,9 +238,9 @@ class Viewer:
         """
         stack, deadline_s = self.cell.stack, time.monotonic() + _DRAG_S
         while True:
-            foot = self.grab()
+            foot = self.grab(along)
             for share in np.linspace(0.0, 1.0, moves + 1)[1:]:
-                self.lift_to(foot, share * height_m)
+                self.lift_to(foot, share * height_m, along)
                 stack.elapse(_LOOK_S)
             until_s = time.monotonic() + _GRAB_S
             while time.monotonic() < until_s:

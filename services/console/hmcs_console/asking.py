@@ -14,15 +14,19 @@ from hmcs.bus.session import Answer, Bus, RequestRefusedError, StoppedError
 M = TypeVar("M", bound=Message)
 
 _AT_ONCE = 2
+WAITING = 8
+"""So many requests may wait for what comes of them; a hand does not get that far."""
 
 
 class Asking:
     """Asks, and keeps what comes of it until `take` is called on the bus' own thread."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, at_once: int = _AT_ONCE) -> None:
+        """Ask so many questions at once; the others wait for their turn."""
         self._bus = bus
-        self._pool = ThreadPoolExecutor(_AT_ONCE, thread_name_prefix="asking")
+        self._pool = ThreadPoolExecutor(at_once, thread_name_prefix="asking")
         self._come: deque[Callable[[], None]] = deque()
+        self._waiting = 0
 
     def ask(
         self,
@@ -53,29 +57,33 @@ class Asking:
         member: Member,
         verb: str,
         question: Message,
-        told: Callable[[str], None],
-        then: Callable[[], None] = lambda: None,
+        done: Callable[[str], None],
+        failed: Callable[[str], None] | None = None,
+        timeout_s: float = 5.0,
     ) -> None:
         """Ask one process to do something; tell in one line what came of it.
 
-        `then` is called where it was done.
+        `failed` is told why it was not done, where it was not; by default `done` is.
         """
-        key = self._bus.keys.rpc(member.service, member.instance, verb)
-        silent = f"{member.service} gave no answer to {verb}"
+        failed = failed or done
+        if self._waiting == WAITING:
+            failed(f"{WAITING} requests wait for an answer: wait for one before the next")
+            return
+        self._waiting += 1
 
         def come(answers: list[Answer[Done]]) -> None:
-            told(answers[0].body.detail if answers else silent)
+            self._waiting -= 1
             if answers:
-                then()
+                done(answers[0].body.detail)
+            else:
+                failed(f"{member.service} gave no answer to {verb}")
 
-        self.ask(
-            key,
-            question,
-            Done,
-            come,
-            lambda reason: told(f"{member.service} refused: {reason}"),
-            timeout_s=5.0,
-        )
+        def refused(reason: str) -> None:
+            self._waiting -= 1
+            failed(f"{member.service} refused: {reason}")
+
+        key = self._bus.keys.rpc(member.service, member.instance, verb)
+        self.ask(key, question, Done, come, refused, timeout_s)
 
     def take(self) -> None:
         """Hand on what has come."""

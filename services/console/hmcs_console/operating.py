@@ -3,10 +3,17 @@
 One page operates at a time. Holding the handle is the dead-man's switch: a page that lets go, goes
 away, is stopped, or gives no sign of life for as long as the lease lasts has released it, and has
 to grab the handle anew.
+
+A page may keep its handle to a plane, and scale it. A change of that while the handle is held holds
+from the next time it is taken: its arrows cannot change while one of them is dragged, so what is
+drawn and what is told would not be the same. Positions are told from where it was taken, so that
+none depends on what came between.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +22,7 @@ from numpy.typing import NDArray
 from hmcs.bus.messages import Handle
 from hmcs_console import lease as leases
 from hmcs_console.lease import Lease
+from hmcs_console.rules import FREE, Grip, Rule, led_to
 
 SETTLE_S = 0.03
 """So long a grabbed handle is told as released: where two of them wait, only the newer is heard."""
@@ -73,11 +81,18 @@ class Pedaled(NamedTuple):
     at_s: float
 
 
+class Ruled(NamedTuple):
+    """A page has its handle lead otherwise."""
+
+    client: int
+    rule: Rule
+
+
 class Stopped(NamedTuple):
     """Somebody wants the robot to stand."""
 
 
-Event = Grabbed | Moved | LetGo | Gone | Alive | Clutched | Pedaled | Stopped
+Event = Grabbed | Moved | LetGo | Gone | Alive | Clutched | Pedaled | Ruled | Stopped
 
 
 class Operating(NamedTuple):
@@ -87,7 +102,11 @@ class Operating(NamedTuple):
     """Name of this console: operators are told apart by it and the number of their page."""
     lease: Lease = leases.FREE
     position: NDArray[np.float64] = np.zeros(3)
-    """Of the operator's handle, m, base frame, shape (3,)."""
+    """Where the operator's handle leads to, m, base frame, shape (3,)."""
+    grip: Grip = Grip(np.zeros(3))
+    """How the operator took hold of it."""
+    rules: Mapping[int, Rule] = MappingProxyType({})
+    """By the pages that do not have their handle lead freely."""
     clutched: frozenset[int] = frozenset()
     """Pages whose clutch is pressed."""
     held_from_s: float = 0.0
@@ -134,17 +153,22 @@ def after(operating: Operating, event: Event) -> Outcome:
             return _after_grab(operating, event)
         case Moved(client, at_s, position) if leases.holds(operating.lease, client):
             lease = leases.alive(operating.lease, client, at_s)
-            return Outcome(operating._replace(lease=lease, position=position))
+            told = led_to(operating.grip, position)
+            return Outcome(operating._replace(lease=lease, position=told))
         case Alive(client, at_s):
             return Outcome(operating._replace(lease=leases.alive(operating.lease, client, at_s)))
         case LetGo(client):
             return _released(operating, leases.given_up(operating.lease, client))
         case Gone(client):
-            unclutched = operating._replace(clutched=operating.clutched - {client})
-            return _released(unclutched, leases.given_up(operating.lease, client))
+            without = operating._replace(
+                clutched=operating.clutched - {client}, rules=_ruled(operating, client, FREE)
+            )
+            return _released(without, leases.given_up(operating.lease, client))
         case Clutched(client, on):
             others = operating.clutched - {client}
             return Outcome(operating._replace(clutched=others | {client} if on else others))
+        case Ruled(client, rule):
+            return Outcome(operating._replace(rules=_ruled(operating, client, rule)))
         case Pedaled(client, at_s) if leases.holds(operating.lease, client):
             return Outcome(operating._replace(pedal_until_s=at_s + PEDAL_S))
         case Stopped():
@@ -170,11 +194,17 @@ def _after_grab(operating: Operating, event: Grabbed) -> Outcome:
     held = operating._replace(
         lease=lease,
         position=event.position,
+        grip=Grip(event.position, operating.rules.get(event.client, FREE)),
         held_from_s=event.at_s + SETTLE_S,
         pedal_until_s=0.0,
     )
     # Said as released first: the way from where a handle was let go before is no motion.
     return Outcome(held, handles=(_release(held),))
+
+
+def _ruled(operating: Operating, client: int, rule: Rule) -> dict[int, Rule]:
+    others = {page: kept for page, kept in operating.rules.items() if page != client}
+    return others if rule == FREE else others | {client: rule}
 
 
 def _released(operating: Operating, lease: Lease, notice: str = "") -> Outcome:

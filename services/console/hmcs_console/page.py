@@ -10,15 +10,27 @@ import contextlib
 import io
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from hmcs_console.operating import Alive, Clutched, Event, Gone, Grabbed, LetGo, Moved, Pedaled
+from hmcs_console.inbox import Inbox, Press, Taken
+from hmcs_console.operating import (
+    Alive,
+    Clutched,
+    Event,
+    Gone,
+    Grabbed,
+    LetGo,
+    Moved,
+    Pedaled,
+    Ruled,
+    Stopped,
+)
+from hmcs_console.rules import KEPT_TO, LARGEST, SMALLEST, SPACE, Axes, position_of, rule_of
 
 _PULSE_S = 0.05
 _PEDAL_HZ = 10.0
@@ -50,8 +62,11 @@ class Page:
         self.server = Server()
         self._handle_at = handle_at
         self._lease_s = lease_s
-        self._events: deque[Event | Callable[[], None]] = deque()
+        self._inbox = Inbox()
         self._handles: dict[int, viser.TransformControlsHandle] = {}
+        self._dragging: set[int] = set()
+        self._axes: dict[int, Axes] = {}
+        """That a handle is to show as soon as it is not dragged."""
         self._held = threading.Event()
         self._holder: int | None = None
         self._closing = False
@@ -73,19 +88,20 @@ class Page:
 
         async def go(client: viser.ClientHandle) -> None:
             self._handles.pop(client.client_id, None)
+            self._dragging.discard(client.client_id)
+            self._axes.pop(client.client_id, None)
             self.put(Gone(client.client_id))
 
         self.server.on_client_disconnect(go)
         self.server.on_client_connect(come)
 
-    def put(self, event: Event | Callable[[], None]) -> None:
+    def put(self, event: Event | Press) -> None:
         """Put down what a viewer did, or is to be done for it; from any thread."""
-        self._events.append(event)
+        self._inbox.put(event)
 
-    def take_events(self) -> Iterator[Event | Callable[[], None]]:
-        """Take what viewers did since the last time, oldest first."""
-        while self._events:
-            yield self._events.popleft()
+    def take_events(self) -> Taken:
+        """Take what viewers did since the last time."""
+        return self._inbox.take()
 
     def hold(self, client: int | None) -> None:
         """Ask the page that operates again and again whether it lives; None for no page."""
@@ -96,8 +112,9 @@ class Page:
         """Let the handles nobody holds follow the tool, m, shape (3,)."""
         self._handle_at = position
         for client, handle in list(self._handles.items()):
-            if client != holder and not np.allclose(handle.position, position, atol=1e-4):
-                with contextlib.suppress(RuntimeError):
+            # A page that is gone cannot be drawn to; and one may have told anything of its handle.
+            with contextlib.suppress(RuntimeError, ValueError, TypeError):
+                if client != holder and not np.allclose(handle.position, position, atol=1e-4):
                     handle.position = position
 
     def tell(self, client: int, text: str) -> None:
@@ -125,13 +142,18 @@ class Page:
         number = client.client_id
 
         async def drag(event: viser.TransformControlsEvent) -> None:
-            now_s, position = time.monotonic(), np.array(event.target.position, dtype=float)
-            if event.phase == "start":
-                self.put(Grabbed(number, now_s, position))
-            elif event.phase == "update":
-                self.put(Moved(number, now_s, position))
-            else:
+            now_s, position = time.monotonic(), position_of(event.target.position)
+            if event.phase == "end":
+                self._dragging.discard(number)
                 self.put(LetGo(number))
+                self._show_axes(number)
+            elif position is None:
+                pass
+            elif event.phase == "start":
+                self._dragging.add(number)
+                self.put(Grabbed(number, now_s, position))
+            else:
+                self.put(Moved(number, now_s, position))
 
         handle.on_update(drag)
 
@@ -139,6 +161,20 @@ class Page:
         number = client.client_id
         clutch = client.gui.add_checkbox("Clutch", False, hint="Moves the handle, not the robot")
         pedal = client.gui.add_button("Pedal", hint="Hold: a mark, or a cue to the fixture")
+        kept_to = client.gui.add_dropdown(
+            "Keep to",
+            tuple(KEPT_TO),
+            initial_value=SPACE,
+            hint="Where the handle moves, from when it is next taken",
+        )
+        scale = client.gui.add_slider(
+            "Scale",
+            SMALLEST,
+            LARGEST,
+            0.1,
+            1.0,
+            hint="Motion of the robot for one of the handle, from when it is next taken",
+        )
 
         async def change_clutch(event: viser.GuiEvent[Any]) -> None:
             self.put(Clutched(number, bool(event.target.value)))
@@ -150,11 +186,33 @@ class Page:
         async def press_pedal(_: object) -> None:
             self.put(Pedaled(number, time.monotonic()))
 
+        async def change_rule(_: viser.GuiEvent[Any]) -> None:
+            rule = rule_of(kept_to.value, scale.value)
+            self.put(Ruled(number, rule))
+            self._axes[number] = rule.axes
+            self._show_axes(number)
+
+        async def stop(_: viser.CommandEvent) -> None:
+            self.put(Stopped())
+
         clutch.on_update(change_clutch)
         pedal.on_hold(press_pedal, callback_hz=_PEDAL_HZ)
+        kept_to.on_update(change_rule)
+        scale.on_update(change_rule)
         # With the mouse on the handle only the keyboard is free.
         client.gui.add_command("Clutch", hotkey="C").on_trigger(toggle_clutch)
         client.gui.add_command("Pedal", hotkey="P").on_trigger(press_pedal)
+        client.gui.add_command("Stop", hotkey="S").on_trigger(stop)
+
+    def _show_axes(self, number: int) -> None:
+        """Show the arrows a handle is to have, unless it is dragged.
+
+        A page makes a handle anew that has other arrows, and does not tell any more that the old
+        one is let go of.
+        """
+        handle = self._handles.get(number)
+        if handle is not None and number not in self._dragging and number in self._axes:
+            handle.active_axes = self._axes.pop(number)
 
     def _feel_pulse(self) -> None:
         """Have the page that operates answer; a still hand tells nothing of it."""

@@ -33,6 +33,12 @@ def color_of(state: str, states: Sequence[str]) -> Color:
     return _STATES[states.index(state) % len(_STATES)] if state in states else UNKNOWN
 
 
+def faint(color: Color) -> Color:
+    """Return a color as it is where it shall not draw the eye."""
+    red, green, blue = ((2 * value + 3 * 225) // 5 for value in color)
+    return red, green, blue
+
+
 def css(color: Color) -> str:
     """Return a color as a page writes it."""
     return "#{:02x}{:02x}{:02x}".format(*color)

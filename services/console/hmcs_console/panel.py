@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Protocol
 
 import viser
 
 from hmcs_console import wishes, words
+from hmcs_console.buttons import on_click
+from hmcs_console.inbox import pressed_by
 from hmcs_console.plots import Plots
 from hmcs_console.seen import Picture
+from hmcs_console.timeline import Editing, Timeline
 from hmcs_console.wishes import Question
 
 _NO_LABEL = "(none)"
@@ -18,14 +20,24 @@ _NO_LABEL = "(none)"
 class Wishes(Protocol):
     """Who carries out what is asked for on the page; called on the page's threads."""
 
+    @property
+    def recordings(self) -> Editing:
+        """Who shows recordings and sets their labels."""
+
     def stop(self) -> None:
-        """Let the robot stand."""
+        """Let every robot stand."""
 
     def ask(self, question: Question) -> None:
         """Have a process do something."""
 
     def take_over(self) -> None:
-        """Have the fixture follow what was trained last."""
+        """Have the fixture follow what was trained last, once it was compared."""
+
+    def activate_now(self) -> None:
+        """Have the fixture follow it without comparing it any longer."""
+
+    def back(self) -> None:
+        """Have the fixture follow the recognizer that was active before."""
 
     def label(self, state: str) -> None:
         """Say in which state the hand is from now on; empty ends what was labeled."""
@@ -40,12 +52,14 @@ class Panel:
         self._gui = gui
         self._wishes = carried_out_by
         self._states = states
-        stop = gui.add_button("Stop", color="red", hint="Lets go of the handle, whoever holds it")
-        _on_click(stop, carried_out_by.stop)
+        stop = gui.add_button("Stop", color="red", hint="Every robot stands, whoever drives it")
+        on_click(stop, carried_out_by.stop)
         self._answer = gui.add_markdown("")
         tabs = gui.add_tab_group()
         self.operating = tabs.add_tab("Operate")
         with self.operating:
+            with gui.add_folder("How to engage, clutch and stop", expand_by_default=False):
+                gui.add_markdown(words.operating())
             self._operator = gui.add_markdown(words.operates(""))
             self._doing = gui.add_markdown("")
             self._why = gui.add_markdown(words.why(None))
@@ -55,9 +69,14 @@ class Panel:
         with tabs.add_tab("Recognizers"):
             self._recognizers = gui.add_markdown("")
             self._choice = gui.add_dropdown("Recognizer", (_NO_LABEL,))
-            _on_click(gui.add_button("Activate"), self._activate)
+            on_click(gui.add_button("Activate"), self._activate)
+            back = gui.add_button("Back", hint="To the one that was active before")
+            on_click(back, carried_out_by.back)
+        self.rules = tabs.add_tab("Task")
         with tabs.add_tab("Teach"):
             self._add_teaching(task)
+        with tabs.add_tab("Recordings"):
+            self._timeline = Timeline(gui, carried_out_by.recordings, self._use_for_training)
         with tabs.add_tab("Services"):
             self._services = gui.add_markdown("")
         self._drawn: dict[int, str] = {}
@@ -72,10 +91,12 @@ class Panel:
         self._write(self._services, words.services(picture.health))
         self._write(self._training, words.training(picture.training))
         self._write(self._answer, picture.answer)
+        self._write(self._takeover, picture.takeover)
         share = picture.training.share if picture.training is not None else 0.0
         self._progress.value = 100.0 * share  # type: ignore[misc]
         self._offer(picture.recognizers)
         self._plots.draw(picture.rows)
+        self._timeline.draw(picture.take, picture.states)
 
     def _add_teaching(self, task: str) -> None:
         gui = self._gui
@@ -84,30 +105,45 @@ class Panel:
             record = gui.add_button_group("Recording", ("Begin", "End"))
         with gui.add_folder("Label"):
             self._label = gui.add_dropdown("State", (_NO_LABEL, *self._states))
-            _on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
+            on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
         with gui.add_folder("Train"):
             model = gui.add_text("Model", "taught")
             task_name = gui.add_text("Task", task)
-            files = gui.add_text("Demonstrations", "", hint="Files, as the trainer sees them")
+            self._files = gui.add_text("Demonstrations", "", hint="Files, as the trainer sees them")
             kind = gui.add_text("Recognizer", "", hint="The default one where it is empty")
+            find_states = gui.add_checkbox("Find states (no labels needed)", False)
             train = gui.add_button("Train")
+            on_click(gui.add_button("Cancel"), lambda: self._wishes.ask(wishes.cancel()))
             self._progress = gui.add_progress_bar(0.0)
             self._training = gui.add_markdown("")
-            _on_click(
+            on_click(
                 gui.add_button(
-                    "Activate what was trained", hint="As a recognizer beside the others"
+                    "Activate what was trained",
+                    hint="After it ran for a while beside the one that is active",
                 ),
                 self._wishes.take_over,
             )
+            on_click(
+                gui.add_button("Activate now", hint="Without comparing it any longer"),
+                self._wishes.activate_now,
+            )
+            self._takeover = gui.add_markdown("")
 
         async def change_recording(event: viser.GuiEvent[Any]) -> None:
-            self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
+            with pressed_by(event.client_id):
+                self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
 
         record.on_click(change_recording)
-        _on_click(
+        on_click(
             train,
             lambda: self._wishes.ask(
-                wishes.train(model.value, task_name.value, files.value, kind.value)
+                wishes.train(
+                    model.value,
+                    task_name.value,
+                    self._files.value,
+                    kind.value,
+                    find_states=find_states.value,
+                )
             ),
         )
 
@@ -117,6 +153,11 @@ class Panel:
     def _activate(self) -> None:
         if self._choice.value != _NO_LABEL:
             self._wishes.ask(wishes.activate(self._choice.value))
+
+    def _use_for_training(self, path: str) -> None:
+        there = [file for file in self._files.value.split(", ") if file]
+        if path and path not in there:
+            self._files.value = ", ".join([*there, path])  # type: ignore[misc]
 
     def _take_states(self, states: tuple[str, ...]) -> None:
         """Once a recognizer tells what the states are, where no task did."""
@@ -137,10 +178,3 @@ class Panel:
         if self._drawn.get(id(place)) != text:
             self._drawn[id(place)] = text
             place.content = text
-
-
-def _on_click(button: viser.GuiButtonHandle, act: Callable[[], None]) -> None:
-    async def click(_: object) -> None:
-        act()
-
-    button.on_click(click)

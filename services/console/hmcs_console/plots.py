@@ -9,7 +9,8 @@ import viser
 from viser import uplot
 
 from hmcs_console.history import SPAN_S, Rows, columns, limits
-from hmcs_console.palette import DIRECTION, FASTER, SLOWER, UNKNOWN, Color, color_of, css
+from hmcs_console.hops import FAST, SLOW, hop_names
+from hmcs_console.palette import DIRECTION, FASTER, FORCE, SLOWER, UNKNOWN, Color, color_of, css
 
 _HEIGHT_PX = 170
 _SHARE = (0.0, 1.05)
@@ -41,6 +42,7 @@ class Plots:
                 "distance, m",
                 (Curve("guide", "to the guide", FASTER), Curve("obstacle", "obstacle", SLOWER)),
             ),
+            _Plot(gui, "latency, ms", _latencies()),
         ]
 
     def draw(self, rows: Rows) -> None:
@@ -102,3 +104,10 @@ def _scales(limits: tuple[float, float]) -> dict[str, uplot.Scale]:
 def _probabilities(states: Sequence[str]) -> tuple[Curve, ...]:
     of_states = (Curve(f"P {state}", state, color_of(state, states)) for state in states)
     return (*of_states, Curve("P unknown", "unknown", UNKNOWN))
+
+
+def _latencies() -> tuple[Curve, ...]:
+    hops = (*hop_names(FAST), *hop_names(SLOW))
+    return tuple(
+        Curve(hop, hop, color) for hop, color in zip(hops, (FASTER, SLOWER, FORCE), strict=True)
+    )

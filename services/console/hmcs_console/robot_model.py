@@ -43,9 +43,6 @@ def written(files: dict[str, bytes], folder: Path) -> dict[str, str]:
     return names
 
 
-def joints_of(
-    looks: RobotLooks, positions: NDArray[np.float64], known: tuple[str, ...]
-) -> dict[str, float]:
-    """Return the position, rad, of each joint that was told and that the description knows."""
-    told = zip(looks.joints, positions, strict=False)
-    return {name: float(position) for name, position in told if name in known}
+def joints_of(looks: RobotLooks, positions: NDArray[np.float64]) -> dict[str, float]:
+    """Return the position, rad or m, of each joint that was told, by its name."""
+    return dict(zip(looks.joints, positions.tolist(), strict=False))

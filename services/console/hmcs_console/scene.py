@@ -1,39 +1,40 @@
-"""What moves in the scene: robot, trails, the guide that leads, directions and forces."""
+"""What moves in the scene: robot, trails, guides, directions and forces."""
 
 from __future__ import annotations
 
 import logging
+import time
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from viser.extras import ViserUrdf
 
 from hmcs.bus.messages import FixtureState, RobotLooks, RobotState
-from hmcs_console.geometry import line, wxyz
-from hmcs_console.models import Guides
-from hmcs_console.palette import DIRECTION, FORCE, UNKNOWN, Color, color_of
+from hmcs.recognition.model import Model
+from hmcs_console.drawn_guides import DrawnGuides
+from hmcs_console.drawn_robot import DrawnRobot
+from hmcs_console.geometry import wxyz
+from hmcs_console.palette import DIRECTION, FORCE, Color
 from hmcs_console.robot_model import joints_of, load_robot
 from hmcs_console.seen import Picture
+from hmcs_console.trails import Pieces
 
+TRAILS_EVERY_S = 0.1
+"""How often trails are drawn: a long one is more to send than all else that moves."""
 _ARROW_M = 0.12
 _M_PER_N = 0.02
 _LONGEST_FORCE_M = 0.3
 _SHORTEST_M = 2e-3
 _NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
+_NO_COLORS = np.zeros((1, 2, 3), dtype=np.uint8)
+"""Lines that begin with one color for all are never drawn with one for each."""
 
 
 class Scene:
     """Draws pictures into the scene; called on one thread."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        guides: Guides,
-        log: logging.Logger,
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, log: logging.Logger) -> None:
         self._server = server
-        self._guides = guides
         self._log = log
         scene = server.scene
         self._tool = scene.add_frame(
@@ -41,28 +42,29 @@ class Scene:
         )
         self._robot_trail = self._lines("/trails/robot", 0.004)
         self._hand_trail = self._lines("/trails/hand", 0.002)
-        self._guide = scene.add_frame("/guide", show_axes=False, visible=False)
+        self._guides = DrawnGuides(scene)
+        self._drawn_trails: tuple[Pieces, ...] = ()
+        self._trails_s = 0.0
         self._direction = self._arrow("/arrows/direction", DIRECTION)
         self._force = self._arrow("/arrows/force", FORCE)
         self._looks: RobotLooks | None = None
-        self._robot: ViserUrdf | None = None
-        self._joints: dict[str, float] = {}
-        self._drawn_guide = ("", "", "", "")
+        self._robot: DrawnRobot | None = None
 
-    def draw(self, picture: Picture) -> None:
-        """Draw a moment."""
+    def draw(self, picture: Picture, model: Model | None) -> None:
+        """Draw a moment, with the guides of the model that is followed."""
         if picture.looks is not self._looks:
             self._load(picture.looks)
         if picture.robot is not None:
             self._draw_robot(picture.robot)
-        self._draw_guide(picture)
+        self._guides.draw(picture, model)
         self._draw_arrows(picture.robot, picture.fixture)
-        _set_lines(self._robot_trail, *picture.robot_trail)
-        _set_lines(self._hand_trail, *picture.hand_trail)
+        now_s = time.monotonic()
+        if now_s - self._trails_s >= TRAILS_EVERY_S:
+            self._trails_s = now_s
+            self._draw_trails((picture.robot_trail, picture.hand_trail))
 
     def _load(self, looks: RobotLooks | None) -> None:
         self._looks = looks
-        self._joints = {}
         if self._robot is not None:
             self._robot.remove()
             self._robot = None
@@ -70,7 +72,7 @@ class Scene:
             return
         try:
             self._server.scene.add_frame("/robot", show_axes=False)
-            self._robot = ViserUrdf(self._server, load_robot(looks), root_node_name="/robot")
+            self._robot = DrawnRobot(self._server, load_robot(looks), "/robot")
         except Exception:
             # Whatever a description does to its parsers, the tool is drawn all the same.
             self._log.warning("the robot cannot be drawn", exc_info=True)
@@ -81,41 +83,13 @@ class Scene:
         self._tool.wxyz = wxyz(robot.tool_orientation)
         if self._robot is None or self._looks is None:
             return
-        known = self._robot.get_actuated_joint_names()
-        joints = joints_of(self._looks, robot.joint_positions, known)
-        if joints and joints != self._joints:
-            # Its description takes joints by name, too, which its drawing hands on.
-            self._robot.update_cfg(joints)  # type: ignore[arg-type]
-            self._joints = joints
+        self._robot.move(joints_of(self._looks, robot.joint_positions))
 
-    def _draw_guide(self, picture: Picture) -> None:
-        fixture = picture.fixture
-        if fixture is None or fixture.guide_origin is None or not fixture.gesteme:
-            self._guide.visible = False
-            return
-        model_hash = picture.belief.model_hash if picture.belief is not None else ""
-        wanted = (fixture.model, model_hash, fixture.state, fixture.gesteme)
-        if wanted != self._drawn_guide:
-            self._drawn_guide = wanted
-            self._make_guide(*wanted, color_of(fixture.state, picture.states))
-        self._guide.position = fixture.guide_origin
-        self._guide.visible = True
-
-    def _make_guide(
-        self, model: str, model_hash: str, state: str, gesteme: str, color: Color
-    ) -> None:
-        scene = self._server.scene
-        # Taking the frame away takes what lies in it along.
-        self._guide.remove()
-        self._guide = scene.add_frame("/guide", show_axes=False)
-        guide = self._guides.find(model, model_hash, state, gesteme)
-        if guide is None:
-            return
-        scene.add_line_segments("/guide/path", line(guide.points), color, thickness=0.008)
-        if guide.volume is not None:
-            scene.add_mesh_simple(
-                "/guide/volume", *guide.volume, color=color, opacity=0.2, side="double"
-            )
+    def _draw_trails(self, trails: tuple[Pieces, Pieces]) -> None:
+        for handle, pieces in zip((self._robot_trail, self._hand_trail), trails, strict=True):
+            if not any(pieces is drawn for drawn in self._drawn_trails):
+                _set_lines(handle, pieces)
+        self._drawn_trails = trails
 
     def _draw_arrows(self, robot: RobotState | None, fixture: FixtureState | None) -> None:
         if robot is None or fixture is None:
@@ -130,7 +104,7 @@ class Scene:
 
     def _lines(self, name: str, thickness_m: float) -> viser.LineSegmentsHandle:
         return self._server.scene.add_line_segments(
-            name, _NOTHING, UNKNOWN, thickness=thickness_m, visible=False
+            name, _NOTHING, _NO_COLORS, thickness=thickness_m, visible=False
         )
 
     def _arrow(self, name: str, color: Color) -> viser.ArrowsHandle:
@@ -145,13 +119,11 @@ class Scene:
         )
 
 
-def _set_lines(
-    handle: viser.LineSegmentsHandle, segments: NDArray[np.float32], colors: NDArray[np.uint8]
-) -> None:
-    handle.visible = len(segments) > 0
-    if len(segments):
-        handle.points = segments
-        handle.colors = colors
+def _set_lines(handle: viser.LineSegmentsHandle, pieces: Pieces) -> None:
+    handle.visible = len(pieces.segments) > 0
+    if len(pieces.segments):
+        handle.points = pieces.segments
+        handle.colors = pieces.colors
 
 
 def _set_arrow(

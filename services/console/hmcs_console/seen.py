@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import (
     Belief,
+    Evidence,
     FixtureState,
     Health,
     Motion,
@@ -18,13 +18,17 @@ from hmcs.bus.messages import (
     Step,
     TrainingProgress,
 )
+from hmcs_console.gathered import Gathered, beneath, gathered
 from hmcs_console.history import Rows, written
+from hmcs_console.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.palette import UNKNOWN, Color, color_of
 from hmcs_console.shadows import Agreement, Shadows
-from hmcs_console.trails import Points, Trail
+from hmcs_console.takes import Take
+from hmcs_console.trails import Pieces, Points, Trail
 
 T = TypeVar("T")
 
+NS_PER_S = 1_000_000_000
 FORGOTTEN_S = 2.0
 """What was not said again for so long is not shown as what is."""
 
@@ -36,15 +40,16 @@ class Picture(NamedTuple):
     fixture: FixtureState | None
     belief: Belief | None
     """Of the recognizer that is followed."""
+    evidence: tuple[Evidence, ...]
+    """That it stands on, of each classifier; none where there is no such layer."""
     active: str
     """Name of that recognizer; empty while there is none."""
     recognizers: tuple[str, ...]
     agreement: dict[str, Agreement]
     """Of the others with it, by name."""
-    robot_trail: tuple[NDArray[np.float32], NDArray[np.uint8]]
-    """Both ends of each piece, m, shape (n, 2, 3), and their colors, the same shape."""
-    hand_trail: tuple[NDArray[np.float32], NDArray[np.uint8]]
-    """As of the robot; laid to where the robot was when the hand took hold."""
+    robot_trail: Pieces
+    hand_trail: Pieces
+    """Laid to where the robot was when the hand took hold."""
     rows: Rows
     """The last half minute in numbers."""
     states: tuple[str, ...]
@@ -59,6 +64,10 @@ class Picture(NamedTuple):
     """Which page operates; empty while none does."""
     operating_client: int | None
     """Its number."""
+    takeover: str
+    """How far a newcomer among the recognizers is; empty where there is none."""
+    take: Take = Take()
+    """What is shown of a recording."""
 
 
 class Seen:
@@ -75,10 +84,13 @@ class Seen:
         self.health: dict[Member, Health] = {}
         self.training: TrainingProgress | None = None
         self.answer = ""
+        self.takeover = ""
         self._rows: Rows = ()
         self._robot: tuple[float, RobotState] | None = None
         self._fixture: tuple[float, FixtureState] | None = None
         self._beliefs: dict[str, tuple[float, Belief]] = {}
+        self._evidence: dict[str, Gathered] = {}
+        self._fast, self._slow = Arrivals(FAST), Arrivals(SLOW)
         self._shadows = Shadows()
         self._robot_trail, self._hand_trail = Trail(), Trail()
         self._hand_offset: Points | None = None
@@ -113,12 +125,33 @@ class Seen:
         if not self.states:
             self.states = belief.states
 
+    def evident(self, recognizer: str, evidence: Evidence) -> None:
+        """Take in what a classifier makes of a step."""
+        known = self._evidence.get(recognizer, Gathered())
+        self._evidence[recognizer] = gathered(known, evidence)
+
+    def in_fast_loop(self, stage: int, cause: Cause, at_ns: int) -> None:
+        """Take in when a message of a stage of the fast loop came, monotonic ns."""
+        self._fast.came(stage, cause, at_ns)
+
+    def in_slow_loop(self, stage: int, cause: Cause, at_ns: int) -> None:
+        """Take in when a message of a stage of the slow loop came, monotonic ns."""
+        self._slow.came(stage, cause, at_ns)
+
     def active(self, now_s: float) -> str:
         """Return which recognizer is followed: as the fixture says, else the only one."""
         fixture = _fresh(self._fixture, now_s)
         if fixture is not None:
             return fixture.model
         return next(iter(self._beliefs)) if len(self._beliefs) == 1 else ""
+
+    def agreement(self, active: str) -> dict[str, Agreement]:
+        """Return how every other recognizer agrees with the active one, by name."""
+        return self._shadows.agreement(active)
+
+    def forget(self, recognizer: str) -> None:
+        """Compare a recognizer by what it says from now on."""
+        self._shadows.forget(recognizer)
 
     def write_down(self, now_s: float) -> None:
         """Add a row to the history."""
@@ -127,16 +160,19 @@ class Seen:
     def picture(self, now_s: float, operator: str, client: int | None) -> Picture:
         """Return this moment."""
         active = self.active(now_s)
+        # A hand at rest makes no steps, and so no beliefs: the last one holds.
+        belief = self._beliefs[active][1] if active in self._beliefs else None
+        known = self._evidence.get(active)
         return Picture(
             robot=_fresh(self._robot, now_s),
             fixture=_fresh(self._fixture, now_s),
-            # A hand at rest makes no steps, and so no beliefs: the last one holds.
-            belief=self._beliefs[active][1] if active in self._beliefs else None,
+            belief=belief,
+            evidence=() if belief is None or known is None else beneath(belief, known),
             active=active,
             recognizers=self._shadows.recognizers,
             agreement=self._shadows.agreement(active),
-            robot_trail=(self._robot_trail.segments, self._robot_trail.colors),
-            hand_trail=(self._hand_trail.segments, self._hand_trail.colors),
+            robot_trail=self._robot_trail.pieces,
+            hand_trail=self._hand_trail.pieces,
             rows=self._rows,
             states=self.states,
             looks=self.looks,
@@ -145,10 +181,12 @@ class Seen:
             answer=self.answer,
             operator=operator,
             operating_client=client,
+            takeover=self.takeover,
         )
 
     def _numbers(self, now_s: float) -> dict[str, float]:
-        numbers: dict[str, float] = {}
+        now_ns = round(now_s * NS_PER_S)
+        numbers = self._fast.medians_ms(now_ns) | self._slow.medians_ms(now_ns)
         robot, fixture = _fresh(self._robot, now_s), _fresh(self._fixture, now_s)
         said = self._beliefs.get(self.active(now_s))
         if said is not None:

@@ -8,21 +8,16 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
 from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import (
     Ask,
-    Belief,
-    FixtureState,
-    Handle,
     Health,
     Label,
-    Motion,
     RobotLooks,
-    RobotState,
-    Step,
     TrainingProgress,
 )
 from hmcs.bus.service import Service
@@ -30,13 +25,18 @@ from hmcs.bus.session import Answer, Bus, Received
 from hmcs_console import wishes
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.gateway import Gateway
+from hmcs_console.hands import Hands
 from hmcs_console.history import EVERY_S
-from hmcs_console.models import Guides, load_models, task_of
-from hmcs_console.operating import Operating, Outcome, Stopped, after, waited
+from hmcs_console.listening import Listening
+from hmcs_console.models import Models, load_models, task_of
+from hmcs_console.operating import Stopped
 from hmcs_console.page import Page
 from hmcs_console.painter import Painter
+from hmcs_console.recordings import Recordings
 from hmcs_console.seen import Picture, Seen
 from hmcs_console.settings import ConsoleSettings
+from hmcs_console.stopping import Stopping
+from hmcs_console.swapping import Swapping
 from hmcs_console.view import View
 from hmcs_console.wishes import Question
 
@@ -46,9 +46,10 @@ HANDLE_HZ = 30.0
 """How often a held handle is told, however seldom the page is drawn: one that is silent for longer
 than a few of these counts as let go."""
 HEALTH_EVERY_S = 2.0
+WATCH_EVERY_S = 0.1
+"""How often is looked at how a newcomer among the recognizers does."""
 UNWATCHED_EVERY_S = 1.0
 """How often is drawn while nobody looks, so that who comes sees how it is."""
-NS_PER_S = 1_000_000_000
 
 
 class Console(Service):
@@ -62,42 +63,47 @@ class Console(Service):
         models = load_models(settings.models)
         task = task_of(settings.task, models)
         self._seen = Seen(() if task is None else tuple(state.name for state in task.states))
-        self._operating = Operating(bus.source.instance)
-        self._handles = bus.publisher(Handle, bus.keys.handle)
         self._labels = bus.publisher(Label, bus.keys.label)
         self._asking = Asking(bus)
+        self._stopping = Stopping(bus)
+        self._swapping = Swapping(self._seen, self._request, settings.compare_s)
+        self.recordings = Recordings(
+            self._asking,
+            bus.keys,
+            lambda: first_of("recorder", self._seen.members),
+            lambda act: self.page.put(act),
+        )
+        """What is shown of recordings, and how their labels are set."""
         self._unwatched_until_s = 0.0
         # A trainer finds a task by what the console was told, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
-        self._view = View(Guides(models), task, taught, self, settings.lease_s, log)
+        known = Models(models, settings.models, log)
+        self._view = View(known, task, taught, self, settings.lease_s, log)
         token = settings.token.get_secret_value() if settings.token is not None else None
         try:
             self._gateway = Gateway(
-                settings.host, settings.port, self.page.server.get_port(), token
+                settings.host, settings.port, self.page.server.get_port(), token, log
             )
         except BaseException:
             self.page.close()
             self._asking.close()
+            self._stopping.close()
             raise
+        self._hands = Hands(self.page, bus, settings.lease_s, log, self._stop_robots)
         self._painter: Painter[Picture] = Painter(self._view.draw, settings.rate_hz, log)
 
     def start(self) -> None:
         """Listen to everybody, and let viewers operate."""
         bus, keys, seen = self.bus, self.bus.keys, self._seen
-        bus.subscribe(Motion, keys.motion, lambda got: seen.hand_moved(got.body))
-        bus.subscribe(Step, keys.step, self._on_step)
-        bus.subscribe(Belief, keys.belief(ANY), self._on_belief)
-        bus.subscribe(
-            FixtureState, keys.fixture_state, lambda got: seen.fixture_changed(_s(got), got.body)
-        )
-        bus.subscribe(RobotState, keys.robot_state, lambda got: seen.robot_moved(_s(got), got.body))
+        Listening(bus, seen, self.log)
         bus.subscribe(TrainingProgress, keys.training, self._on_training)
         bus.watch(keys.presence(ANY, ANY), self._on_presence)
         bus.every(TAKE_EVERY_S, self._take)
-        bus.every(1 / HANDLE_HZ, self._tell_handle)
+        bus.every(1 / HANDLE_HZ, self._hands.tell_handle)
         bus.every(1 / self.settings.rate_hz, self._show)
         bus.every(EVERY_S, lambda: seen.write_down(time.monotonic()))
         bus.every(HEALTH_EVERY_S, self._ask_health)
+        bus.every(WATCH_EVERY_S, self._swapping.watch)
         self.log.info("page", extra={"url": self.url})
 
     @property
@@ -120,7 +126,7 @@ class Console(Service):
         """Healthy unless drawing fails."""
         if self._painter.failure:
             return False, f"cannot draw, see the log: {self._painter.failure}"
-        operator = self._operating.operator
+        operator = self._hands.operating.operator
         viewers = self.page.viewers
         return True, (
             f"{viewers} {'viewer' if viewers == 1 else 'viewers'} at {self.url}, "
@@ -133,16 +139,17 @@ class Console(Service):
 
     def close(self) -> None:
         """Let go of the robot, and send viewers away."""
-        self._follow(after(self._operating, Stopped()))
+        self._hands.let_go()
         self._gateway.close()
         self._painter.close()
         self.page.close()
         self._asking.close()
+        self._stopping.close()
 
     # --- what the page wishes; on its threads -----------------------------------------------------
 
     def stop(self) -> None:
-        """Let the robot stand: whoever operates has let go."""
+        """Let every robot stand: whoever operates here has let go, and the others are overruled."""
         self.page.put(Stopped())
 
     def ask(self, question: Question) -> None:
@@ -150,8 +157,16 @@ class Console(Service):
         self.page.put(partial(self._ask, question))
 
     def take_over(self) -> None:
-        """Have the fixture follow what was trained last."""
-        self.page.put(self._take_over)
+        """Have the fixture follow what was trained last, once it was compared."""
+        self.page.put(self._swapping.take_over)
+
+    def activate_now(self) -> None:
+        """Have the fixture follow it without comparing it any longer."""
+        self.page.put(self._swapping.activate_now)
+
+    def back(self) -> None:
+        """Have the fixture follow the recognizer that was active before."""
+        self.page.put(self._swapping.back)
 
     def label(self, state: str) -> None:
         """Say in which state the hand is from now on."""
@@ -161,61 +176,35 @@ class Console(Service):
 
     def _take(self) -> None:
         """Do what viewers want, end what has lapsed."""
-        for event in self.page.take_events():
-            if callable(event):
-                event()
-            else:
-                self._follow(after(self._operating, event))
-        self._follow(waited(self._operating, time.monotonic(), self.settings.lease_s))
+        self._hands.take()
         self._asking.take()
+        self._stopping.take()
 
-    def _follow(self, outcome: Outcome) -> None:
-        before, self._operating = self._operating, outcome.operating
-        for handle in outcome.handles:
-            self._handles.put(handle)
-        for client, text in outcome.notices:
-            self.page.tell(client, text)
-        holder = self._operating.lease.client
-        if holder != before.lease.client:
-            self.page.hold(holder)
-            operator = self._operating.operator
-            self.log.info("operated" if operator else "let go", extra={"operator": operator})
-
-    def _tell_handle(self) -> None:
-        handle = self._operating.handle(time.monotonic())
-        if handle is not None:
-            self._handles.put(handle)
+    def _stop_robots(self) -> None:
+        robots = [member for member in self._seen.members if member.service == "robot"]
+        self._stopping.stop(robots, self._tell)
 
     def _show(self) -> None:
         now_s = time.monotonic()
         watched = self.page.viewers > 0 or now_s >= self._unwatched_until_s
         if watched and self._painter.due(now_s):
             self._unwatched_until_s = now_s + UNWATCHED_EVERY_S
-            operating = self._operating
-            self._painter.show(
-                now_s, self._seen.picture(now_s, operating.operator, operating.lease.client)
-            )
+            operating = self._hands.operating
+            picture = self._seen.picture(now_s, operating.operator, operating.lease.client)
+            self._painter.show(now_s, picture._replace(take=self.recordings.take))
 
-    def _take_over(self) -> None:
-        questions = wishes.take_over(self._seen.training)
-        if not questions:
-            self._tell("nothing was trained yet: train first")
-        else:
-            self._ask(*questions)
+    def _ask(self, question: Question) -> None:
+        self._tell(f"asking {question.service} to {question.verb} …")
+        self._request(question, self._tell, self._tell)
 
-    def _ask(self, question: Question, *more: Question) -> None:
+    def _request(
+        self, question: Question, done: Callable[[str], None], failed: Callable[[str], None]
+    ) -> None:
         member = first_of(question.service, self._seen.members)
         if member is None:
-            self._tell(f"no {question.service} is there to {question.verb}: start one")
+            failed(f"no {question.service} is there to {question.verb}: start one")
         else:
-            self._tell(f"asking {question.service} to {question.verb} …")
-            self._asking.request(
-                member,
-                question.verb,
-                question.body,
-                self._tell,
-                lambda: self._ask(*more) if more else None,
-            )
+            self._asking.request(member, question.verb, question.body, done, failed)
 
     def _label(self, state: str) -> None:
         label = wishes.label(state, self._seen.clock, self._seen.step)
@@ -226,19 +215,6 @@ class Console(Service):
         self._seen.answer = answer
 
     # --- listening --------------------------------------------------------------------------------
-
-    def _on_step(self, received: Received[Step]) -> None:
-        self._seen.clock = received.envelope.source.boot
-        self._seen.step = received.body
-
-    def _on_belief(self, received: Received[Belief]) -> None:
-        belief = received.body
-        if len(belief.states) != len(belief.probabilities):
-            self.bus.counters.count_refused(Belief.SCHEMA, "not one probability for each state")
-            return
-        before, after_name = self.bus.keys.belief(ANY).split(ANY)
-        name = received.key.removeprefix(before).removesuffix(after_name)
-        self._seen.believed(_s(received), name, belief)
 
     def _on_training(self, received: Received[TrainingProgress]) -> None:
         self._seen.training = received.body
@@ -272,7 +248,3 @@ class Console(Service):
         }
         there = self._seen.members
         self._seen.health = {member: health for member, health in told.items() if member in there}
-
-
-def _s(received: Received[RobotState] | Received[FixtureState] | Received[Belief]) -> float:
-    return received.received_ns / NS_PER_S

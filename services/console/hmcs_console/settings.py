@@ -26,6 +26,9 @@ class ConsoleSettings(ServiceSettings):
     """How often the page is drawn at best."""
     lease_s: float = Field(default=0.25, ge=0.1, le=2.0)
     """An operator whose page gives no sign of life for so long has let go."""
+    compare_s: float = Field(default=5.0, ge=0, le=600)
+    """How long a newcomer among the recognizers is compared with the active one before it is
+    activated; 0 for not at all."""
     models: tuple[Path, ...] = ()
     """Model files, or folders of them, whose learned paths are drawn."""
     task: str | None = None

@@ -27,6 +27,10 @@ class Shadows:
         """Write down which state a recognizer holds likely after step `step` of a device."""
         self._said[recognizer].append((clock, step, state))
 
+    def forget(self, recognizer: str) -> None:
+        """Leave out what was said so far by whoever bore a name."""
+        self._said.pop(recognizer, None)
+
     @property
     def recognizers(self) -> tuple[str, ...]:
         """Who was heard, by name."""

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hmcs_console.palette import Color
 
 Points = NDArray[np.float64]
+
+
+class Pieces(NamedTuple):
+    """Pieces of a way."""
+
+    segments: NDArray[np.float32]
+    """Both ends of each, m, shape (n, 2, 3)."""
+    colors: NDArray[np.uint8]
+    """Of both ends of each, shape (n, 2, 3)."""
 
 
 class Trail:
@@ -19,6 +30,7 @@ class Trail:
         self._count = 0
         self._spacing_m = spacing_m
         self._last: Points | None = None
+        self._pieces: Pieces | None = None
 
     def add(self, point: Points, color: Color) -> None:
         """Go on to a point, m, shape (3,); too near the last one it is left out."""
@@ -33,17 +45,16 @@ class Trail:
             self._colors[self._count] = color
             self._count += 1
             self._last = point
+            self._pieces = None
 
     def lift(self) -> None:
         """Go on elsewhere, without a piece that leads there."""
         self._last = None
 
     @property
-    def segments(self) -> NDArray[np.float32]:
-        """Both ends of each piece, oldest first, m, shape (n, 2, 3)."""
-        return self._segments[: self._count].copy()
-
-    @property
-    def colors(self) -> NDArray[np.uint8]:
-        """Of both ends of each piece, shape (n, 2, 3)."""
-        return self._colors[: self._count].copy()
+    def pieces(self) -> Pieces:
+        """The pieces, oldest first; the very same as long as there are no more."""
+        if self._pieces is None:
+            kept = slice(0, self._count)
+            self._pieces = Pieces(self._segments[kept].copy(), self._colors[kept].copy())
+        return self._pieces

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import logging
 import time
+from pathlib import Path
 
 import numpy as np
 
+from hmcs.bus.messages import TrainingProgress
+from hmcs.recognition.model import Model
 from hmcs.task import Task
-from hmcs_console.models import Guides
+from hmcs_console.explained import Explained
+from hmcs_console.models import Models
 from hmcs_console.page import Page
 from hmcs_console.panel import Panel, Wishes
 from hmcs_console.scene import Scene
 from hmcs_console.seen import Picture
+from hmcs_console.sounds import Sounds
 from hmcs_console.surroundings import draw_ground, draw_workspace
+from hmcs_console.timeline import TakePath
 
 WORDS_EVERY_S = 0.2
 """How often words and plots are drawn: nobody reads faster."""
@@ -25,7 +31,7 @@ class View:
 
     def __init__(
         self,
-        guides: Guides,
+        models: Models,
         task: Task | None,
         taught: str,
         wishes: Wishes,
@@ -43,16 +49,22 @@ class View:
         draw_ground(server.scene)
         if task is not None:
             draw_workspace(server.scene, task.workspace)
-        self._scene = Scene(server, guides, log)
+        self._models = models
+        self._training: TrainingProgress | None = None
+        self._scene = Scene(server, log)
+        self._path = TakePath(server.scene, np.array(start_m))
         self._panel = Panel(server.gui, wishes, states, taught)
+        self._explained = Explained(server.gui, self._panel.operating, self._panel.rules)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)
+        self._sounds = Sounds(server, self._panel.operating)
 
     def draw(self, picture: Picture) -> None:
         """Draw a moment."""
-        server = self.page.server
+        server, model = self.page.server, self._followed(picture)
         with server.atomic():
-            self._scene.draw(picture)
+            self._scene.draw(picture, model)
+            self._path.draw(picture.take, picture.states)
         if picture.robot is not None:
             self.page.lead_handles(picture.robot.tool_position, picture.operating_client)
         now_s = time.monotonic()
@@ -60,3 +72,15 @@ class View:
             self._words_s = now_s
             with server.atomic():
                 self._panel.draw(picture)
+                self._explained.draw(picture, model)
+                fixture = picture.fixture
+                self._sounds.draw(now_s, None if fixture is None else fixture.off_guide_m)
+
+    def _followed(self, picture: Picture) -> Model | None:
+        """The model of the recognizer that is followed; what was trained just now is one, too."""
+        if picture.training is not self._training:
+            self._training = told = picture.training
+            if told is not None and told.stage == "done" and told.path:
+                self._models.look_in(Path(told.path))
+        belief = picture.belief
+        return self._models.find(picture.active, "" if belief is None else belief.model_hash)

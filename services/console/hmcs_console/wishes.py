@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 from hmcs.bus.messages import (
     ActivateRecognizer,
+    Ask,
     Label,
-    LoadModel,
     Message,
     Record,
     Step,
     Train,
-    TrainingProgress,
 )
 
 
@@ -35,22 +34,9 @@ def activate(recognizer: str) -> Question:
     return Question("fixture_controller", "activate", ActivateRecognizer(model=recognizer))
 
 
-def take_over(trained: TrainingProgress | None) -> tuple[Question, ...]:
-    """Return the wishes, one after another, that make the fixture follow what was trained.
-
-    None where nothing was trained to its end.
-    """
-    if trained is None or trained.stage != "done":
-        return ()
-    load = LoadModel(path=trained.path)
-    return (
-        Question("fixture_controller", "load_model", load),
-        Question("recognizer", "load_model", load),
-        activate(trained.model),
-    )
-
-
-def train(model: str, task: str, demonstrations: str, recognizer: str) -> Question:
+def train(
+    model: str, task: str, demonstrations: str, recognizer: str, *, find_states: bool = False
+) -> Question:
     """Return the wish for a training; demonstrations are told apart by commas or blanks."""
     files = tuple(part for part in re.split(r"[,\s]+", demonstrations) if part)
     return Question(
@@ -61,8 +47,14 @@ def train(model: str, task: str, demonstrations: str, recognizer: str) -> Questi
             task=task.strip(),
             demonstrations=files,
             recognizer=recognizer.strip(),
+            find_states=find_states,
         ),
     )
+
+
+def cancel() -> Question:
+    """Return the wish that what is being trained is not trained any further."""
+    return Question("trainer", "cancel", Ask())
 
 
 def label(state: str, clock: str, last: Step | None) -> Label:

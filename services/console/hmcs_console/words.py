@@ -86,6 +86,17 @@ def operates(operator: str) -> str:
     return f"**{operator}** operates."
 
 
+def operating() -> str:
+    """Return how to operate."""
+    return (
+        "**Engage**: take the handle at the tool with the mouse; holding it is the dead-man's "
+        "switch. **Let go**, and the robot stands. **Clutch** (C): the handle moves and the robot "
+        "does not, to reach farther. **Stop** (S): every robot stands, whoever drives it, until "
+        "its operator lets go and takes hold again. **Keep to** and **Scale** hold from when the "
+        "handle is next taken."
+    )
+
+
 def services(health: Mapping[Member, Health | None]) -> str:
     """Return how every process is that is there."""
     if not health:
@@ -102,6 +113,8 @@ def training(progress: TrainingProgress | None) -> str:
 
 
 def _standing(robot: RobotState) -> str:
+    if robot.stop == "asked":
+        return "**stands**: asked to, until its operator lets go and takes hold again"
     if robot.stop != "none":
         return f"**stands**: {robot.stop.replace('_', ' ')}"
     return "follows" + (f", limited by {', '.join(robot.limited)}" if robot.limited else "")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import socket
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Handle, Label, RobotState
+from hmcs.bus.messages import Handle, Label, Message, Origin, RobotState
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
 from hmcs.recognition.model import Model
@@ -142,9 +143,9 @@ class Cell:
         """End the console; a second time does nothing."""
         self._end.close()
 
-    def open_bus(self, service: str) -> Bus:
+    def open_bus(self, service: str, instance: str = "x") -> Bus:
         settings = BusSettings(router=self._router, connect_timeout_s=DEADLINE_S)
-        return self._stack.enter_context(Bus.open(settings, service, "x", log=LOG))
+        return self._stack.enter_context(Bus.open(settings, service, instance, log=LOG))
 
     def until(self, condition: Callable[[], object], what: str) -> None:
         """Pump everybody until the condition holds; fail naming `what` after the deadline."""
@@ -159,7 +160,7 @@ class Cell:
         end_s = time.monotonic() + seconds
         self.until(lambda: time.monotonic() >= end_s, "time to go by")
 
-    def move_robot(self, x_m: float) -> None:
+    def move_robot(self, x_m: float, origin: Origin | None = None) -> None:
         """Publish where the robot is."""
         still = np.zeros(6)
         self.robot_states.put(
@@ -176,7 +177,8 @@ class Cell:
                 contacts=(),
                 stop="none",
                 limited=(),
-            )
+            ),
+            origin,
         )
 
 
@@ -185,3 +187,46 @@ def make_cell(router: str) -> Iterator[Callable[..., Cell]]:
     """Bring up a console with these settings and whoever it talks to."""
     with ExitStack() as stack:
         yield lambda **settings: Cell(router, stack, **settings)
+
+
+class Process:
+    """Somebody who answers questions, on a thread of its own, as another process would be."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        service: str,
+        instance: str,
+        answers: Mapping[str, tuple[type[Any], Callable[[Any], Message]]],
+    ) -> None:
+        """Be there, and answer by verb: the type of a question, and who answers it."""
+        self.bus = cell.open_bus(service, instance)
+        self.ending = threading.Event()
+        for verb, (question, answer) in answers.items():
+            self.bus.answer(verb, question, answer)
+        self.bus.announce(self.bus.keys.presence(service, instance))
+        self._thread = threading.Thread(target=self._live)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End."""
+        self.ending.set()
+        self._thread.join()
+
+    def _live(self) -> None:
+        while not self.ending.is_set():
+            self.bus.pump(0.005)
+
+
+@pytest.fixture
+def make_process(make_cell: Callable[..., Cell]) -> Iterator[Callable[..., Process]]:
+    """Bring up somebody a console talks to."""
+    del make_cell  # Ends after whoever is on its buses.
+    with ExitStack() as stack:
+
+        def make(*arguments: Any) -> Process:
+            process = Process(*arguments)
+            stack.callback(process.close)
+            return process
+
+        yield make

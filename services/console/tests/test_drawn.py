@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yourdfpy
 from numpy.testing import assert_allclose
 
 from hmcs.bus.messages import Motion, RobotLooks, RobotState
 from hmcs.bus.service import UserError
-from hmcs_console.models import Guides, load_models, task_of
+from hmcs_console.drawn_robot import DrawnRobot
+from hmcs_console.models import Models, guide_of, load_models, task_of
+from hmcs_console.page import Server
 from hmcs_console.painter import Painter
 from hmcs_console.robot_model import joints_of, load_robot, written
 from hmcs_console.seen import FORGOTTEN_S, Seen
@@ -54,23 +57,53 @@ def test_the_task_is_the_named_one_else_that_of_the_first_model(model_file: Path
 
 
 def test_a_guide_is_the_learned_path_with_the_volume_of_its_state(model_file: Path) -> None:
-    models = load_models([model_file])
-    guides = Guides(models)
-    free = guides.find("lines", "", "free", "line")
+    (model,) = load_models([model_file])
+    free, cone = guide_of(model, "free", "line"), guide_of(model, "in", "line")
     assert free is not None
     assert_allclose(free.points[:, 0], [0, 0.25, 0.5])
     assert free.volume is None
-    cone = guides.find("a shadow of it", models[0].hash, "in", "line")
     assert cone is not None
     assert cone.volume is not None
     radii = np.linalg.norm(cone.volume.vertices[:, 1:], axis=1).reshape(3, -1)
     assert_allclose(radii[:, 0], [0.05, 0.03, 0.01])
+    assert guide_of(model, "in", "strange") is None
 
 
-def test_a_guide_nobody_knows_is_none(model_file: Path) -> None:
-    guides = Guides(load_models([model_file]))
-    assert guides.find("strange", "strange", "in", "line") is None
-    assert guides.find("lines", "", "in", "strange") is None
+def test_a_guide_is_as_large_as_the_robot_is_led(model_file: Path) -> None:
+    (model,) = load_models([model_file])
+    fixture = model.task.fixture.model_copy(update={"operator_scale": 0.5})
+    halved = model._replace(task=model.task.model_copy(update={"fixture": fixture}))
+    guide = guide_of(halved, "in", "line")
+    assert guide is not None
+    assert guide.volume is not None
+    assert_allclose(guide.points[:, 0], [0, 0.125, 0.25])
+    assert_allclose(np.abs(guide.volume.vertices[:, 1:]).max(), 0.025)
+
+
+def test_a_model_is_found_by_its_hash_whatever_its_recognizer_is_called(model_file: Path) -> None:
+    (model,) = load_models([model_file])
+    models = Models((model,), (), LOG)
+    assert models.find("a shadow of it", model.hash) is model
+    assert models.find("lines", "") is model
+    assert models.find("lines", "another hash") is None
+    assert models.find("strange", "") is None
+
+
+def test_a_model_is_looked_for_in_files_once_until_another_is_written(
+    model_file: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (model,) = load_models([model_file])
+    places = (tmp_path / "damaged.hmcs", tmp_path / "nowhere")
+    places[0].write_bytes(b"no model")
+    models = Models((), places, LOG)
+    with caplog.at_level(logging.INFO):
+        assert models.find("lines", model.hash) is None
+        assert models.find("lines", model.hash) is None
+    assert len(caplog.records) == 1
+    models.look_in(model_file)
+    found = models.find("lines", model.hash)
+    assert found is not None
+    assert found.hash == model.hash
 
 
 def test_a_robot_is_loaded_with_the_meshes_that_came_with_it() -> None:
@@ -97,9 +130,76 @@ def test_a_mesh_finds_its_materials_beside_it(tmp_path: Path) -> None:
     assert Path(names["n/link.obj"]).read_bytes() == b"3"
 
 
-def test_joints_the_description_does_not_know_are_left_out() -> None:
-    looks = RobotLooks(robot="arm", urdf=URDF, joints=("j1", "strange"), files={})
-    assert joints_of(looks, np.array([0.5, 0.7]), ("j1",)) == {"j1": 0.5}
+def moving() -> yourdfpy.URDF:
+    """An arm with every kind of joint there is, its axes and origins awry."""
+    joints = [
+        ("turn", "revolute", 'xyz="1 2 -1"', ""),
+        ("still", "fixed", "", ""),
+        ("slide", "prismatic", 'xyz="0 -1 0"', ""),
+        ("wheel", "continuous", 'xyz="-1 0 0"', ""),
+        (
+            "finger",
+            "prismatic",
+            'xyz="0 1 0"',
+            '<mimic joint="slide" multiplier="-2" offset="0.1"/>',
+        ),
+        ("thumb", "revolute", 'xyz="0 0 1"', '<mimic joint="turn" multiplier="0.5" offset="0.2"/>'),
+    ]
+    links = "".join(f'<link name="l{number}"/>' for number in range(len(joints) + 1))
+    told = "".join(
+        f'<joint name="{name}" type="{kind}">'
+        f'<parent link="l{number}"/><child link="l{number + 1}"/>'
+        f'<origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 {number}"/>{axis and f"<axis {axis}/>"}{mimic}'
+        '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+        for number, (name, kind, axis, mimic) in enumerate(joints)
+    )
+    return load_robot(
+        RobotLooks(
+            robot="arm", urdf=f'<robot name="arm">{links}{told}</robot>', joints=(), files={}
+        )
+    )
+
+
+def poses(robot: DrawnRobot) -> list[tuple[list[float], list[float]]]:
+    """Position, and orientation with its sign made even, of every joint's frame."""
+    return [
+        (frame.position.tolist(), (frame.wxyz * np.sign(frame.wxyz[0])).tolist())
+        for frame in robot._joint_frames
+    ]
+
+
+def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
+    server = Server()
+    quick, exact = DrawnRobot(server, moving(), "/quick"), DrawnRobot(server, moving(), "/exact")
+    for joints in (
+        {"turn": 0.7, "slide": -0.3, "wheel": 2.5},
+        {"turn": 0.0, "slide": 0.05, "wheel": -2.5},
+        {"turn": -1.2, "slide": 0.0, "wheel": 0.0},
+    ):
+        quick.move(joints)
+        exact.update_cfg(joints)  # type: ignore[arg-type]
+        for one, other in zip(poses(quick), poses(exact), strict=True):
+            assert_allclose(one[0], other[0], atol=1e-9)
+            assert_allclose(one[1], other[1], atol=1e-9)
+    server.stop()
+
+
+def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None:
+    server = Server()
+    robot = DrawnRobot(server, moving(), "/robot")
+    robot.move({"turn": 0.5, "wheel": 1.0})
+    before = poses(robot)
+    robot.move({"turn": 0.50005})
+    robot.move({"strange": 1.0})
+    assert poses(robot) == before
+    robot.move({"turn": 0.6})
+    assert poses(robot) != before
+    server.stop()
+
+
+def test_joints_are_told_by_their_names() -> None:
+    looks = RobotLooks(robot="arm", urdf=URDF, joints=("j1", "j2"), files={})
+    assert joints_of(looks, np.array([0.5, 0.7])) == {"j1": 0.5, "j2": 0.7}
 
 
 # --- what is kept ---------------------------------------------------------------------------------

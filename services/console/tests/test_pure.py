@@ -65,16 +65,17 @@ def test_a_trail_keeps_its_newest_pieces_only() -> None:
     trail = Trail(longest=3, spacing_m=0.5)
     for number in range(10):
         trail.add(along_x(number), (number, 0, 0))
-    assert_allclose(trail.segments[:, 0, 0], [6, 7, 8])
-    assert_allclose(trail.segments[:, 1, 0], [7, 8, 9])
-    assert trail.colors[:, 0, 0].tolist() == trail.colors[:, 1, 0].tolist() == [7, 8, 9]
+    assert_allclose(trail.pieces.segments[:, 0, 0], [6, 7, 8])
+    assert_allclose(trail.pieces.segments[:, 1, 0], [7, 8, 9])
+    colors = trail.pieces.colors
+    assert colors[:, 0, 0].tolist() == colors[:, 1, 0].tolist() == [7, 8, 9]
 
 
 def test_a_trail_leaves_out_what_is_too_near() -> None:
     trail = Trail(spacing_m=0.1)
     for x in (0.0, 0.05, 0.09, 0.11):
         trail.add(along_x(x), UNKNOWN)
-    assert_allclose(trail.segments[:, :, 0], [[0.0, 0.11]], rtol=1e-6)
+    assert_allclose(trail.pieces.segments[:, :, 0], [[0.0, 0.11]], rtol=1e-6)
 
 
 def test_a_lifted_trail_has_no_piece_to_where_it_goes_on() -> None:
@@ -82,7 +83,20 @@ def test_a_lifted_trail_has_no_piece_to_where_it_goes_on() -> None:
     trail.add(along_x(0.0), UNKNOWN)
     trail.lift()
     trail.add(along_x(1.0), UNKNOWN)
-    assert trail.segments.shape == trail.colors.shape == (0, 2, 3)
+    segments, colors = trail.pieces
+    assert segments.shape == colors.shape == (0, 2, 3)
+
+
+def test_a_trail_is_the_very_same_as_long_as_nothing_was_added() -> None:
+    trail = Trail(spacing_m=0.1)
+    for x in (0.0, 0.2):
+        trail.add(along_x(x), UNKNOWN)
+    before = trail.pieces
+    trail.add(along_x(0.25), UNKNOWN)
+    assert trail.pieces is before
+    trail.add(along_x(0.4), UNKNOWN)
+    assert len(before.segments) == 1
+    assert len(trail.pieces.segments) == 2
 
 
 def test_history_has_a_column_for_each_number_and_gaps_where_it_was_not_told() -> None:
@@ -204,6 +218,13 @@ def test_demonstrations_are_told_apart_by_commas_and_blanks() -> None:
     assert asked.body == Train(
         model="mine", task="demo", demonstrations=("a.csv", "b.csv", "c.hdf5")
     )
+
+
+def test_states_are_found_in_demonstrations_where_that_is_wished() -> None:
+    for find_states in (False, True):
+        body = wishes.train("mine", "demo", "a.csv", "", find_states=find_states).body
+        assert isinstance(body, Train)
+        assert body.find_states is find_states
 
 
 def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:

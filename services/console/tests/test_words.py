@@ -119,6 +119,8 @@ def test_doing_tells_law_guide_and_robot() -> None:
 
 def test_doing_tells_why_a_robot_stands_and_who_is_not_heard() -> None:
     assert "**stands**: stale command" in words.doing(None, robot(stop="stale_command"))
+    asked = words.doing(None, robot(stop="asked"))
+    assert "**stands**: asked to, until its operator lets go and takes hold again" in asked
     assert "No fixture controller" in words.doing(None, None)
     assert "No robot" in words.doing(None, None)
 
@@ -151,6 +153,11 @@ def test_a_training_tells_its_stage_and_where_the_model_is() -> None:
     )
     assert words.training(progress).endswith("/m/mine.hmcs")
     assert "No training" in words.training(None)
+
+
+def test_how_to_engage_let_go_clutch_and_stop_is_told() -> None:
+    for part in ("Engage", "dead-man", "Let go", "Clutch", "Stop", "Keep to", "Scale"):
+        assert part in words.operating()
 
 
 def test_who_operates_is_told() -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 
 import pytest
 
@@ -16,9 +17,11 @@ def served(join) -> Iterator[Callable[..., Bus]]:
     done = threading.Event()
     threads: list[threading.Thread] = []
 
-    def serve(instance: str, handler: Callable, verb: str = "activate") -> Bus:
+    def serve(
+        instance: str, handler: Callable, verb: str = "activate", aside: Executor | None = None
+    ) -> Bus:
         bus = join("robot", instance)
-        bus.answer(verb, ActivateRecognizer, handler)
+        bus.answer(verb, ActivateRecognizer, handler, aside=aside)
         bus.failures = []  # type: ignore[attr-defined]
 
         def live() -> None:
@@ -115,6 +118,32 @@ def test_an_unexpected_failure_refuses_and_leaves_the_pump(served, asker, until)
     with pytest.raises(RequestRefusedError, match="see the log"):
         ask(asker, "a", until)
     until(lambda: robot.failures)
+    assert isinstance(robot.failures[0], ZeroDivisionError)
+
+
+def test_an_answer_made_aside_holds_nobody_up(served, asker, until) -> None:
+    ticked = threading.Event()
+
+    def handler(_: ActivateRecognizer) -> Done:
+        # It is given only once the answering process has done something else meanwhile.
+        return Done(detail="" if ticked.wait(10.0) else "held up")
+
+    with ThreadPoolExecutor(1) as aside:
+        robot = served("a", handler, aside=aside)
+        robot.every(0.01, ticked.set)
+        (answer,) = ask(asker, "a", until, timeout_s=15.0)
+    assert answer.body.detail == ""
+
+
+def test_an_unexpected_failure_aside_refuses_and_leaves_the_pump(served, asker, until) -> None:
+    def handler(_: ActivateRecognizer) -> Done:
+        raise ZeroDivisionError("inside")
+
+    with ThreadPoolExecutor(1) as aside:
+        robot = served("a", handler, aside=aside)
+        with pytest.raises(RequestRefusedError, match="see the log"):
+            ask(asker, "a", until)
+        until(lambda: robot.failures)
     assert isinstance(robot.failures[0], ZeroDivisionError)
 
 

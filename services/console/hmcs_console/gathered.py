@@ -1,0 +1,34 @@
+"""Evidence of the newest steps, put together from what several classifiers say of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from hmcs.bus.messages import Belief, Evidence
+
+STEPS = 8
+"""So many steps are kept: a belief comes a little after its evidence, and after that of others."""
+
+
+class Gathered(NamedTuple):
+    """What was made of the newest steps of one recognizer."""
+
+    told: Mapping[tuple[str, int], tuple[Evidence, ...]] = MappingProxyType({})
+    """By clock and step, in order of their coming."""
+
+
+def gathered(before: Gathered, evidence: Evidence) -> Gathered:
+    """Return what is known once more evidence has come."""
+    step = evidence.clock, evidence.step
+    if step in before.told:
+        return Gathered({**before.told, step: (*before.told[step], evidence)})
+    newest = list(before.told.items())[-STEPS + 1 :]
+    return Gathered({**dict(newest), step: (evidence,)})
+
+
+def beneath(belief: Belief, known: Gathered) -> tuple[Evidence, ...]:
+    """Return the evidence a belief stands on; of another model than the belief's there is none."""
+    told = known.told.get((belief.clock, belief.step), ())
+    return tuple(each for each in told if each.model_hash == belief.model_hash)

@@ -1,0 +1,65 @@
+"""What a task asks of its fixture in each of its states, as a table."""
+
+from __future__ import annotations
+
+from hmcs.fixtures.rules import Rules, rules_of
+from hmcs.fixtures.volumes import Volume
+from hmcs.task import Task
+
+_HEAD = "| state | law, compliance | ξ | volume, radius | leads |\n|---|---|---|---|---|"
+
+
+def rules(task: Task | None, state_now: str) -> str:
+    """Return law, compliance, maximum factor ξ, volume and aim of every state of a task.
+
+    The state of the moment is in bold.
+    """
+    if task is None:
+        return "No recognizer is followed whose model is known here."
+    every = rules_of(task)
+    rows = [
+        _row(state.name, every.in_state(state.name), state.name == state_now)
+        for state in task.states
+    ]
+    return "\n".join([f"**{task.name}**", "", _HEAD, *rows])
+
+
+def _row(state: str, rules: Rules, now: bool) -> str:
+    cells = (
+        state,
+        f"{rules.law}, {_compliance(rules)}",
+        f"{rules.maximum_factor:.2f}",
+        _volume(rules.volume),
+        _aim(rules),
+    )
+    return "| " + " | ".join(f"**{cell}**" if now else cell for cell in cells) + " |"
+
+
+def _compliance(rules: Rules) -> str:
+    if rules.compliance in ("fixed", "optimal"):
+        return f"{rules.compliance} {rules.fixed_compliance:.2f}"
+    if rules.compliance == "cue":
+        return f"cue: {rules.cue.cue}, {rules.cue.scaling}"
+    return rules.compliance
+
+
+def _volume(volume: Volume | None) -> str:
+    if volume is None:
+        return "none"
+    knots = " → ".join(f"{knot.radius_m * 1e3:.0f}" for knot in volume.knots)
+    at_knots = f"{knots} mm" if knots else ""
+    if volume.of_spread is None:
+        return at_knots
+    spread = f"{volume.of_spread:g} × spread"
+    return f"{spread}, at least {at_knots}" if knots else spread
+
+
+def _aim(rules: Rules) -> str:
+    if rules.target is not None:
+        place = ", ".join(f"{value:.3f}" for value in rules.target.position)
+        turned = "" if rules.target.orientation is None else ", and its turn"
+        return f"to ({place}) m{turned}"
+    if rules.plan is None:
+        return "along the path"
+    shared = "" if rules.shared is None else f"; {', '.join(rules.shared.operator_axes)} shared"
+    return f"plan, {rules.plan.speed_m_s * 1e3:.0f} mm/s{shared}"

@@ -1,0 +1,92 @@
+"""Stop for everybody: over a real router, with robots that are made up."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hmcs.bus.keys import Member
+from hmcs.bus.messages import Ask, Done
+from hmcs.bus.session import RequestRefusedError
+from hmcs_console.operating import Grabbed
+from hmcs_console.stopping import said
+
+MakeCell = Callable[..., Any]
+MakeProcess = Callable[..., Any]
+HERE = np.array([0.6, 0.0, 0.5])
+
+
+def grab(cell: Any, client: int = 1) -> None:
+    cell.service.page.put(Grabbed(client, time.monotonic(), HERE))
+    cell.until(lambda: cell.handles and cell.handles[-1][1].dead_man, "a held handle")
+
+
+def stands(_: Ask) -> Done:
+    return Done(detail="stands")
+
+
+def refuses(_: Ask) -> Done:
+    raise RequestRefusedError("no brakes")
+
+
+def robot(make_process: MakeProcess, cell: Any, name: str, stop: Callable[[Ask], Done]) -> Any:
+    return make_process(cell, "robot", name, {"stop": (Ask, stop)})
+
+
+def stop_until(cell: Any, told: Callable[[str], bool]) -> None:
+    """Stop again and again, as one would until everybody is there, and has told."""
+
+    def stopped() -> bool:
+        cell.service.stop()
+        cell.wait(0.1)
+        return told(cell.service.answer)
+
+    cell.until(stopped, "an answer to stop")
+
+
+def test_stop_asks_every_robot_to_stand_and_tells_what_came_of_it(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell(lease_s=2.0)
+    robot(make_process, cell, "one", stands)
+    robot(make_process, cell, "two", refuses)
+    stop_until(cell, lambda told: "robot one stands" in told and "no brakes" in told)
+    assert "robot two **may still move**: robot refused: no brakes" in cell.service.answer
+    # Whether anybody holds a handle or not; and whoever does has let go.
+    grab(cell)
+    cell.service.stop()
+    cell.until(lambda: not cell.handles[-1][1].dead_man, "the release")
+
+
+def test_stop_tells_where_no_robot_is_there(make_cell: MakeCell) -> None:
+    cell = make_cell()
+    stop_until(cell, lambda told: "no robot is there" in told)
+
+
+def test_a_robot_that_gives_no_answer_may_still_move_which_is_told_and_holds_nobody_up(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    ending = threading.Event()
+
+    def hangs(_: Ask) -> Done:
+        ending.wait(10.0)
+        return Done(detail="late")
+
+    robot(make_process, cell, "hung", hangs)
+    robot(make_process, cell, "well", stands)
+    stop_until(cell, lambda told: "well stands" in told and "hung is asked" in told)
+    cell.until(
+        lambda: "robot hung **may still move**: robot gave no answer" in cell.service.answer,
+        "what came of it",
+    )
+    ending.set()
+
+
+def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:
+    told = said({Member("robot", "a"): "", Member("robot", "b"): "stands"}).split("  \n")
+    assert told[1:] == ["robot a is asked to stand …", "robot b stands"]
