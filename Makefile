@@ -30,7 +30,7 @@ lint: $(READY) ## put the code in the house's format and name what is left to me
 	@$(RUN)/ruff check --fix .
 	@$(RUN)/python -m pytest -q tests/test_house.py
 
-bench: $(READY) ## measure speed and recognition in full, each against its goal; some ten minutes
+bench: $(READY) ## measure speed and recognition in full, each against its goal; some fifteen minutes
 	@PYTHONPATH=tests $(RUN)/python -m bench
 
 peers: $(READY) ## install the libraries that studies compare with, beside the rest

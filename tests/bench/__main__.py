@@ -1,4 +1,4 @@
-"""All figures in full: `make bench`, about thirteen minutes on two cores."""
+"""All figures in full: `make bench`, about fifteen minutes on two cores."""
 
 from __future__ import annotations
 

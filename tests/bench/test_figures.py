@@ -8,7 +8,17 @@ from __future__ import annotations
 
 import pytest
 
-from bench import accuracy, fixture_tick, hmm_speed, messages, step_to_belief, two_hops, whole_stack
+from bench import (
+    accuracy,
+    fixture_tick,
+    hmm_speed,
+    messages,
+    recorder,
+    replay,
+    step_to_belief,
+    two_hops,
+    whole_stack,
+)
 from bench.figures import Figure, tell
 
 
@@ -67,3 +77,20 @@ def test_a_tick_of_the_fixture_is_short_also_at_a_mesh() -> None:
     values = measured(fixture_tick.measure(300))
     assert values["tick without regions"] < 4 * fixture_tick.TICK_US
     assert values["tick sliding along that mesh"] < 4 * fixture_tick.MESH_TICK_US
+
+
+def test_a_recorder_loses_nothing_at_a_thousand_samples_a_second() -> None:
+    values = measured(recorder.measure(3.0))
+    assert values["messages lost"] == 0
+    assert values["CPU of the recorder"] < 2 * recorder.CPU_SHARE
+
+
+def test_a_replay_is_the_same_and_much_faster_than_it_happened() -> None:
+    values = measured(replay.measure(1))
+    assert values["steps replayed with the very same belief"] == 1.0
+    assert values["ticks of the fixture replayed with the same factor"] == 1.0
+    assert values["recognition replayed, times as fast as it happened"] > replay.TIMES_REAL / 2
+    assert (
+        values["learning five states from three demonstrations, with the report"]
+        < 3 * replay.LEARNING_S
+    )

@@ -14,12 +14,13 @@ from typing import IO
 from hmcs.bus.keys import check_name
 from hmcs.bus.messages import Ask, Done, Train, TrainingProgress
 from hmcs.bus.service import Service
-from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.recognition.recognizers import DEFAULT
 from hmcs_trainer.settings import TrainerSettings
 
 TOLD_EVERY_S = 0.1
 _JUDGING = "judging"
+_ENDED = ("done", "failed", "canceled")
 _LEARNED_SHARE = 0.5
 """Of the whole, where learning has ended and judging begins."""
 
@@ -34,6 +35,7 @@ class Trainer(Service):
     def __init__(self, settings: TrainerSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._job: _Job | None = None
+        self._elsewhere: dict[str, str] = {}
         self._last = "nothing was trained yet"
         self._progress = bus.publisher(TrainingProgress, bus.keys.training)
 
@@ -41,6 +43,8 @@ class Trainer(Service):
         """Wait to be asked."""
         self.bus.answer("train", Train, self._train)
         self.bus.answer("cancel", Ask, self._cancel)
+        self.bus.subscribe(TrainingProgress, self.bus.keys.training, self._on_progress)
+        self.bus.watch(self.bus.keys.presence(self.name), self._on_trainer)
         self.bus.every(TOLD_EVERY_S, self._look)
 
     def health(self) -> tuple[bool, str]:
@@ -62,6 +66,12 @@ class Trainer(Service):
                 f"{self._job.model} is being trained: wait until it is done, or cancel it"
             )
         check_name("model", asked.model)
+        for instance, model in self._elsewhere.items():
+            if model == asked.model:
+                raise RequestRefusedError(
+                    f"{model} is being trained by trainer {instance}: wait until it is done, or "
+                    "give this one another name"
+                )
         self.settings.folder.mkdir(parents=True, exist_ok=True)
         self._job = _Job(asked, self.settings.folder.resolve())
         self._tell("checking", "reading demonstrations", 0.0)
@@ -76,6 +86,18 @@ class Trainer(Service):
         self._tell("canceled", "canceled; no model was written", self._job.share)
         self._end(f"{model}: canceled")
         return Done(detail=f"canceled {model}")
+
+    def _on_progress(self, received: Received[TrainingProgress]) -> None:
+        """Keep what other trainers are at."""
+        instance, told = received.envelope.source.instance, received.body
+        if told.stage in _ENDED or instance == self.bus.source.instance:
+            self._elsewhere.pop(instance, None)
+        else:
+            self._elsewhere[instance] = told.model
+
+    def _on_trainer(self, key: str, alive: bool) -> None:
+        if not alive:
+            self._elsewhere.pop(self.bus.keys.member_of(key).instance, None)
 
     def _look(self) -> None:
         job = self._job

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Iterator
 from pathlib import Path
@@ -84,6 +85,21 @@ def test_a_training_is_canceled_without_a_trace(bench: Bench) -> None:
     assert "canceled mine" in bench.trainer._cancel(Ask()).detail
     bench.until("canceled")
     assert list(bench.folder.iterdir()) == []
+
+
+def test_of_two_trainers_only_one_trains_a_model_of_a_name(bench: Bench) -> None:
+    bus = bench.stack.open_bus("trainer", "there")
+    with contextlib.closing(
+        Trainer(TrainerSettings(folder=bench.folder), bus, logging.getLogger("test"))
+    ) as other:
+        other.start()
+        other._train(ASKED)
+        bench.until("learning")
+        with pytest.raises(RequestRefusedError, match="mine is being trained by trainer there"):
+            bench.trainer._train(ASKED)
+        other._cancel(Ask())
+        bench.until("canceled")
+        assert "training mine" in bench.trainer._train(ASKED).detail
 
 
 def test_states_are_found_when_asked_for(bench: Bench) -> None:
