@@ -15,6 +15,8 @@ from hmcs.recognition.layered import Precision
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 
+NS_PER_S = 1_000_000_000
+
 
 def step_of(message: messages.Step) -> Step:
     """Return the step a message tells; their fields have the same names."""
@@ -67,8 +69,11 @@ def guides_of(model: Model) -> Guides:
     )
 
 
-def sample_of(motion: messages.Motion, seq: int) -> OperatorSample:
-    """Return a Motion as the controller takes it; a device without rotation does not rotate."""
+def sample_of(motion: messages.Motion, seq: int, origin: messages.Origin | None) -> OperatorSample:
+    """Return a Motion as the controller takes it; a device without rotation does not rotate.
+
+    `origin` is that of the Motion itself: it tells when the sample was taken.
+    """
     angular = np.zeros(3) if motion.angular_velocity is None else motion.angular_velocity
     return OperatorSample(
         number=seq,
@@ -77,6 +82,7 @@ def sample_of(motion: messages.Motion, seq: int) -> OperatorSample:
         dead_man=motion.dead_man,
         clutch=motion.clutch,
         pedal=motion.pedal,
+        captured_s=None if origin is None else origin.captured_ns / NS_PER_S,
     )
 
 

@@ -81,7 +81,7 @@ def test_a_tick_of_the_fixture_is_short_also_at_a_mesh() -> None:
 
 def test_a_recorder_loses_nothing_at_a_thousand_samples_a_second() -> None:
     values = measured(recorder.measure(3.0))
-    assert values["messages lost"] == 0
+    assert values["messages lost by the recorder"] == 0
     assert values["CPU of the recorder"] < 2 * recorder.CPU_SHARE
 
 

@@ -78,7 +78,7 @@ def performance(
         motion = Motion(position=position, velocity=velocity, dead_man=count >= RESTING)
         yield logged(at_ns, KEYS.motion, motion, hand, origin)
         now_s = (at_ns - BEGUN_NS) / 1e9
-        fixture = controller.sampled(now_s, sample_of(motion, count))
+        fixture = controller.sampled(now_s, sample_of(motion, count, origin))
         source = others["fixture_controller"]
         yield logged(at_ns, KEYS.command, command_of(fixture, 80.0), source, origin)
         yield logged(at_ns, KEYS.fixture_state, state_of(fixture), source, origin)

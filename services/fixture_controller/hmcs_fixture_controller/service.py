@@ -119,8 +119,9 @@ class FixtureController(Service):
         else:
             if source.boot != self._clock:
                 self._begin_clock(source.boot)
-            sample = sample_of(received.body, received.envelope.seq)
-            self._send(self._controller.sampled(now_s, sample), received.envelope.origin)
+            envelope = received.envelope
+            sample = sample_of(received.body, envelope.seq, envelope.origin)
+            self._send(self._controller.sampled(now_s, sample), envelope.origin)
 
     def _watch_input(self) -> None:
         """Command the stop when the operator's samples stay out, and again while they do."""

@@ -176,7 +176,7 @@ class _Again:
             self.refused += 1
             return
         self._follow(boot)
-        made = self._controller.sampled(now_s, sample_of(motion, number))
+        made = self._controller.sampled(now_s, sample_of(motion, number, envelope.origin))
         self.ticks.append(Tick(recorded.log_ns, boot, number, _would_do(made), None))
 
     def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
