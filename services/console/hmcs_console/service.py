@@ -22,23 +22,23 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
-from hmcs_console import wishes
-from hmcs_console.asking import Asking, first_of
-from hmcs_console.gateway import Gateway
-from hmcs_console.hands import Hands
-from hmcs_console.history import EVERY_S
-from hmcs_console.listening import Listening
-from hmcs_console.models import Models, load_models, task_of
-from hmcs_console.operating import Stopped
-from hmcs_console.page import Page
-from hmcs_console.painter import Painter
-from hmcs_console.recordings import Recordings
-from hmcs_console.seen import Picture, Seen
+from hmcs_console.operating.handles import Stopped
+from hmcs_console.operating.hands import Hands
+from hmcs_console.operating.stopping import Stopping
+from hmcs_console.seeing.history import EVERY_S
+from hmcs_console.seeing.listening import Listening
+from hmcs_console.seeing.models import Models, load_models, task_of
+from hmcs_console.seeing.seen import Picture, Seen
+from hmcs_console.serving.gateway import Gateway
+from hmcs_console.serving.page import Page
+from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
-from hmcs_console.stopping import Stopping
-from hmcs_console.swapping import Swapping
+from hmcs_console.teaching import wishes
+from hmcs_console.teaching.asking import Asking, first_of
+from hmcs_console.teaching.recordings import Recordings
+from hmcs_console.teaching.swapping import Swapping
+from hmcs_console.teaching.wishes import Question
 from hmcs_console.view import View
-from hmcs_console.wishes import Question
 
 TAKE_EVERY_S = 0.01
 """How often what viewers did is taken, and leases are looked at."""

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 
 from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
-from hmcs_console.admission import is_loopback
+from hmcs_console.serving.admission import is_loopback
 
 
 class ConsoleSettings(ServiceSettings):

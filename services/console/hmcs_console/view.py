@@ -11,15 +11,15 @@ import numpy as np
 from hmcs.bus.messages import TrainingProgress
 from hmcs.recognition.model import Model
 from hmcs.task import Task
-from hmcs_console.explained import Explained
-from hmcs_console.models import Models
-from hmcs_console.page import Page
-from hmcs_console.panel import Panel, Wishes
-from hmcs_console.scene import Scene
-from hmcs_console.seen import Picture
-from hmcs_console.sounds import Sounds
-from hmcs_console.surroundings import draw_ground, draw_workspace
-from hmcs_console.timeline import TakePath
+from hmcs_console.drawing.scene import Scene
+from hmcs_console.drawing.surroundings import draw_ground, draw_workspace
+from hmcs_console.seeing.models import Models
+from hmcs_console.seeing.seen import Picture
+from hmcs_console.serving.page import Page
+from hmcs_console.teaching.timeline import TakePath
+from hmcs_console.telling.explained import Explained
+from hmcs_console.telling.panel import Panel, Wishes
+from hmcs_console.telling.sounds import Sounds
 
 WORDS_EVERY_S = 0.2
 """How often words and plots are drawn: nobody reads faster."""

@@ -6,7 +6,7 @@ import pytest
 
 from hmcs.bus.service import UserError
 from hmcs.bus.settings import as_yaml, load_settings
-from hmcs_console.admission import Head, admit, head_of, is_loopback
+from hmcs_console.serving.admission import Head, admit, head_of, is_loopback
 from hmcs_console.settings import ConsoleSettings
 
 TOKEN = "a secret; of 8"

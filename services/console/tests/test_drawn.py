@@ -16,12 +16,12 @@ from numpy.testing import assert_allclose
 
 from hmcs.bus.messages import Motion, RobotLooks, RobotState
 from hmcs.bus.service import UserError
-from hmcs_console.drawn_robot import DrawnRobot
-from hmcs_console.models import Models, guide_of, load_models, task_of
-from hmcs_console.page import Server
-from hmcs_console.painter import Painter
-from hmcs_console.robot_model import joints_of, load_robot, written
-from hmcs_console.seen import FORGOTTEN_S, Seen
+from hmcs_console.drawing.drawn_robot import DrawnRobot
+from hmcs_console.drawing.robot_model import joints_of, load_robot, written
+from hmcs_console.seeing.models import Models, guide_of, load_models, task_of
+from hmcs_console.seeing.seen import FORGOTTEN_S, Seen
+from hmcs_console.serving.page import Server
+from hmcs_console.serving.painter import Painter
 
 LOG = logging.getLogger("test")
 URDF = """<robot name="arm"><link name="base"/><link name="upper"><visual><geometry>

@@ -3,7 +3,7 @@ from __future__ import annotations
 import time
 
 from hmcs.bus.messages import Origin
-from hmcs_console.hops import FAST, SLOW, SPAN_NS, Arrivals, cause_of, hop_names
+from hmcs_console.seeing.hops import FAST, SLOW, SPAN_NS, Arrivals, cause_of, hop_names
 
 MS = 1_000_000
 

@@ -10,8 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs_console.inbox import BOUND, Inbox, Press, pressed_by
-from hmcs_console.operating import (
+from hmcs_console.operating.handles import (
     Alive,
     Clutched,
     Event,
@@ -25,7 +24,8 @@ from hmcs_console.operating import (
     Stopped,
     after,
 )
-from hmcs_console.rules import Rule
+from hmcs_console.operating.rules import Rule
+from hmcs_console.serving.inbox import BOUND, Inbox, Press, pressed_by
 
 CLIENTS = (1, 2, 3)
 SMALL = 4

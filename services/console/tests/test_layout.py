@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hmcs_console.layout import Layout, Order, anchored, laid_out, order_of
+from hmcs_console.drawing.layout import Layout, Order, anchored, laid_out, order_of
 from support.lessons import lesson_task
 
 X, Y, Z = np.eye(3)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from hmcs_console import lease as leases
-from hmcs_console.lease import FREE, Lease
+from hmcs_console.operating import lease as leases
+from hmcs_console.operating.lease import FREE, Lease
 
 
 def test_the_first_page_that_grabs_the_handle_operates() -> None:

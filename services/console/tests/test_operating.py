@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hmcs_console.operating import (
+from hmcs_console.operating.handles import (
     PEDAL_S,
     SETTLE_S,
     Alive,

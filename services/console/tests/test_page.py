@@ -16,8 +16,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from hmcs_console.hands import FLOOD
-from hmcs_console.operating import Alive, Clutched, Grabbed, LetGo, Moved
+from hmcs_console.operating.handles import Alive, Clutched, Grabbed, LetGo, Moved
+from hmcs_console.operating.hands import FLOOD
 
 MakeCell = Callable[..., Any]
 HERE = np.array([0.6, 0.0, 0.5])

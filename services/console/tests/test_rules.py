@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from hmcs_console.operating import (
+from hmcs_console.operating.handles import (
     SETTLE_S,
     Event,
     Gone,
@@ -19,7 +19,7 @@ from hmcs_console.operating import (
     Ruled,
     after,
 )
-from hmcs_console.rules import (
+from hmcs_console.operating.rules import (
     FARTHEST_M,
     FREE,
     KEPT_TO,

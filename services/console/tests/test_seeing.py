@@ -27,11 +27,11 @@ from hmcs.bus.wire import encode
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.task import load_task, shipped_tasks
-from hmcs_console import spoken_rules
-from hmcs_console.drawn_guides import DrawnGuides
-from hmcs_console.glancing import Told, told_in
-from hmcs_console.page import Server
-from hmcs_console.seen import Picture, Seen
+from hmcs_console.drawing.drawn_guides import DrawnGuides
+from hmcs_console.seeing.glancing import Told, told_in
+from hmcs_console.seeing.seen import Picture, Seen
+from hmcs_console.serving.page import Server
+from hmcs_console.telling import spoken_rules
 
 MakeCell = Callable[..., Any]
 LOG = logging.getLogger("test")

@@ -17,8 +17,8 @@ import pytest
 from hmcs.bus.messages import Belief, Done, Record
 from hmcs.bus.service import UserError
 from hmcs.bus.session import RequestRefusedError
-from hmcs_console import wishes
-from hmcs_console.operating import Alive, Grabbed, LetGo, Moved
+from hmcs_console.operating.handles import Alive, Grabbed, LetGo, Moved
+from hmcs_console.teaching import wishes
 
 MakeCell = Callable[..., Any]
 HERE, THERE = np.array([0.6, 0.0, 0.5]), np.array([0.7, 0.0, 0.5])

@@ -12,8 +12,8 @@ import numpy as np
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Ask, Done
 from hmcs.bus.session import RequestRefusedError
-from hmcs_console.operating import Grabbed
-from hmcs_console.stopping import said
+from hmcs_console.operating.handles import Grabbed
+from hmcs_console.operating.stopping import said
 
 MakeCell = Callable[..., Any]
 MakeProcess = Callable[..., Any]

@@ -18,7 +18,7 @@ from hmcs.bus.messages import (
     TrainingProgress,
 )
 from hmcs.bus.session import RequestRefusedError
-from hmcs_console import wishes
+from hmcs_console.teaching import wishes
 
 MakeCell = Callable[..., Any]
 MakeProcess = Callable[..., Any]

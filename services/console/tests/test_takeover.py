@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from hmcs.bus.messages import ActivateRecognizer, LoadModel, TrainingProgress
-from hmcs_console import takeover
-from hmcs_console.shadows import Agreement
-from hmcs_console.takeover import Advance, Followed, Takeover
+from hmcs_console.seeing.shadows import Agreement
+from hmcs_console.teaching import takeover
+from hmcs_console.teaching.takeover import Advance, Followed, Takeover
 
 COMPARE_S = 5.0
 NOTHING = Agreement(0, 0)

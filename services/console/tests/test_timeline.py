@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 from hmcs.bus.messages import Done, Outline, OutlineQuestion, SetLabels
 from hmcs.bus.session import RequestRefusedError
 from hmcs.recordings.stretches import LabelError
-from hmcs_console.palette import UNKNOWN, color_of
-from hmcs_console.takes import (
+from hmcs_console.drawing.palette import UNKNOWN, color_of
+from hmcs_console.teaching.takes import (
     Take,
     bands,
     hidden,
@@ -27,7 +27,7 @@ from hmcs_console.takes import (
     states_of,
     unlabeled,
 )
-from hmcs_console.timeline import NONE, TakePath, Timeline
+from hmcs_console.teaching.timeline import NONE, TakePath, Timeline
 
 STATES = ("free", "in")
 

@@ -8,7 +8,7 @@ import wave
 import numpy as np
 import pytest
 
-from hmcs_console.tone import (
+from hmcs_console.telling.tone import (
     HIGHEST_FROM_M,
     LEVELS,
     SILENT,

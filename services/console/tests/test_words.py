@@ -7,8 +7,8 @@ import pytest
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
-from hmcs_console import words
-from hmcs_console.shadows import Agreement
+from hmcs_console.seeing.shadows import Agreement
+from hmcs_console.telling import words
 
 
 def belief(**fields: Any) -> Belief:

@@ -1,0 +1,1 @@
+"""The scene: what stands still, what moves, and what was learned."""

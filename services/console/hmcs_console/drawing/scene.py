@@ -1,0 +1,134 @@
+"""What moves in the scene: robot, trails, guides, directions and forces."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from hmcs.bus.messages import FixtureState, RobotLooks, RobotState
+from hmcs.recognition.model import Model
+from hmcs_console.drawing.drawn_guides import DrawnGuides
+from hmcs_console.drawing.drawn_robot import DrawnRobot
+from hmcs_console.drawing.geometry import wxyz
+from hmcs_console.drawing.palette import DIRECTION, FORCE, Color
+from hmcs_console.drawing.robot_model import joints_of, load_robot
+from hmcs_console.seeing.seen import Picture
+from hmcs_console.seeing.trails import Pieces
+
+TRAILS_EVERY_S = 0.1
+"""How often trails are drawn: a long one is more to send than all else that moves."""
+_ARROW_M = 0.12
+_M_PER_N = 0.02
+_LONGEST_FORCE_M = 0.3
+_SHORTEST_M = 2e-3
+_NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
+_NO_COLORS = np.zeros((1, 2, 3), dtype=np.uint8)
+"""Lines that begin with one color for all are never drawn with one for each."""
+
+
+class Scene:
+    """Draws pictures into the scene; called on one thread."""
+
+    def __init__(self, server: viser.ViserServer, log: logging.Logger) -> None:
+        self._server = server
+        self._log = log
+        scene = server.scene
+        self._tool = scene.add_frame(
+            "/tool", axes_length=0.08, axes_radius=0.004, origin_radius=0.008, visible=False
+        )
+        self._robot_trail = self._lines("/trails/robot", 0.004)
+        self._hand_trail = self._lines("/trails/hand", 0.002)
+        self._guides = DrawnGuides(scene)
+        self._drawn_trails: tuple[Pieces, ...] = ()
+        self._trails_s = 0.0
+        self._direction = self._arrow("/arrows/direction", DIRECTION)
+        self._force = self._arrow("/arrows/force", FORCE)
+        self._looks: RobotLooks | None = None
+        self._robot: DrawnRobot | None = None
+
+    def draw(self, picture: Picture, model: Model | None) -> None:
+        """Draw a moment, with the guides of the model that is followed."""
+        if picture.looks is not self._looks:
+            self._load(picture.looks)
+        if picture.robot is not None:
+            self._draw_robot(picture.robot)
+        self._guides.draw(picture, model)
+        self._draw_arrows(picture.robot, picture.fixture)
+        now_s = time.monotonic()
+        if now_s - self._trails_s >= TRAILS_EVERY_S:
+            self._trails_s = now_s
+            self._draw_trails((picture.robot_trail, picture.hand_trail))
+
+    def _load(self, looks: RobotLooks | None) -> None:
+        self._looks = looks
+        if self._robot is not None:
+            self._robot.remove()
+            self._robot = None
+        if looks is None:
+            return
+        try:
+            self._server.scene.add_frame("/robot", show_axes=False)
+            self._robot = DrawnRobot(self._server, load_robot(looks), "/robot")
+        except Exception:
+            # Whatever a description does to its parsers, the tool is drawn all the same.
+            self._log.warning("the robot cannot be drawn", exc_info=True)
+
+    def _draw_robot(self, robot: RobotState) -> None:
+        self._tool.visible = True
+        self._tool.position = robot.tool_position
+        self._tool.wxyz = wxyz(robot.tool_orientation)
+        if self._robot is None or self._looks is None:
+            return
+        self._robot.move(joints_of(self._looks, robot.joint_positions))
+
+    def _draw_trails(self, trails: tuple[Pieces, Pieces]) -> None:
+        for handle, pieces in zip((self._robot_trail, self._hand_trail), trails, strict=True):
+            if not any(pieces is drawn for drawn in self._drawn_trails):
+                _set_lines(handle, pieces)
+        self._drawn_trails = trails
+
+    def _draw_arrows(self, robot: RobotState | None, fixture: FixtureState | None) -> None:
+        if robot is None or fixture is None:
+            self._direction.visible = self._force.visible = False
+            return
+        force = fixture.wrench[:3] * _M_PER_N
+        length_m = float(np.linalg.norm(force))
+        if length_m > _LONGEST_FORCE_M:
+            force = force * (_LONGEST_FORCE_M / length_m)
+        _set_arrow(self._direction, robot.tool_position, fixture.preferred_direction * _ARROW_M)
+        _set_arrow(self._force, robot.tool_position, force)
+
+    def _lines(self, name: str, thickness_m: float) -> viser.LineSegmentsHandle:
+        return self._server.scene.add_line_segments(
+            name, _NOTHING, _NO_COLORS, thickness=thickness_m, visible=False
+        )
+
+    def _arrow(self, name: str, color: Color) -> viser.ArrowsHandle:
+        return self._server.scene.add_arrows(
+            name,
+            np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, _ARROW_M]]]),
+            color,
+            shaft_radius=0.004,
+            head_radius=0.01,
+            head_length=0.025,
+            visible=False,
+        )
+
+
+def _set_lines(handle: viser.LineSegmentsHandle, pieces: Pieces) -> None:
+    handle.visible = len(pieces.segments) > 0
+    if len(pieces.segments):
+        handle.points = pieces.segments
+        handle.colors = pieces.colors
+
+
+def _set_arrow(
+    handle: viser.ArrowsHandle, begin: NDArray[np.float64], way: NDArray[np.float64]
+) -> None:
+    handle.visible = float(np.linalg.norm(way)) > _SHORTEST_M
+    if handle.visible:
+        handle.points = np.array([[begin, begin + way]], dtype=np.float32)

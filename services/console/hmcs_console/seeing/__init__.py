@@ -1,0 +1,1 @@
+"""What is heard, and one moment of it to be drawn."""

@@ -1,0 +1,120 @@
+"""What is drawn of the task and of what was learned about it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.errors import UserError
+from hmcs.fixtures.rules import rules_of
+from hmcs.recognition.model import Model
+from hmcs.recognition.model_file import load_model, model_files
+from hmcs.task import Task, load_task
+from hmcs_console.drawing.geometry import Surface, tube
+
+
+class Guide(NamedTuple):
+    """A learned path as the fixture uses it in a state."""
+
+    points: NDArray[np.float64]
+    """From the segment's origin, m of the robot, shape (K, 3)."""
+    volume: Surface | None
+    """About it, within which the fixture is free, from the segment's origin, m; None for none."""
+
+
+def load_models(places: Iterable[Path]) -> tuple[Model, ...]:
+    """Return the models in files, and in folders of `*.hmcs` files.
+
+    Raises ModelFileError for a file that cannot be used, UserError for a folder without files.
+    """
+    return tuple(load_model(file) for place in places for file in model_files(place))
+
+
+def task_of(name: str | None, models: tuple[Model, ...]) -> Task | None:
+    """Return the task of a name or a file, else that of the first model, if there is one.
+
+    Raises TaskFileError for a task that cannot be read.
+    """
+    if name is not None:
+        return load_task(name)
+    return models[0].task if models else None
+
+
+def gesteme_of(model: Model, state: str) -> str:
+    """Return the gesteme a state is performed with, of several the first one in the task's file.
+
+    Empty where the task has no such state.
+    """
+    gestemes = (known.gestemes for known in model.task.states if known.name == state)
+    return next(gestemes, ("",))[0]
+
+
+def guide_of(model: Model, state: str, gesteme: str) -> Guide | None:
+    """Return a guide of a model as large as the robot is led; None where it has no such gesteme."""
+    if gesteme not in model.gesteme_names:
+        return None
+    path, rules = model.paths[gesteme], rules_of(model.task).in_state(state)
+    points = rules.operator_scale * path.points
+    if rules.volume is None:
+        return Guide(points, None)
+    progress = path.arc_length / path.length_m
+    radii = [
+        rules.operator_scale * rules.volume.radius_m(float(share), float(spread))
+        for share, spread in zip(progress, model.spreads[gesteme], strict=True)
+    ]
+    return Guide(points, tube(points, radii))
+
+
+class Models:
+    """The models that are known here; one that somebody follows is looked for in files.
+
+    All is done on the thread that draws: a file is small, and read once.
+    """
+
+    def __init__(
+        self, models: Sequence[Model], places: Iterable[Path], log: logging.Logger
+    ) -> None:
+        """Begin with some; `places` are files and folders where others may come to be."""
+        self._log = log
+        self._named = {model.name: model for model in models}
+        self._hashed = {model.hash: model for model in models}
+        self._places = dict.fromkeys(places)
+        self._missed: set[str] = set()
+
+    def look_in(self, place: Path) -> None:
+        """Look in a file, too, which was written just now."""
+        self._places[place] = None
+        self._missed.clear()
+
+    def find(self, recognizer: str, model_hash: str) -> Model | None:
+        """Return the model a recognizer stands on, by its hash; None where it is not known here.
+
+        A recognizer of another name may stand on any model, so its name counts only as long as it
+        has told no hash, which is empty then.
+        """
+        if not model_hash:
+            return self._named.get(recognizer)
+        if model_hash not in self._hashed and model_hash not in self._missed:
+            self._read_files()
+            if model_hash not in self._hashed:
+                self._missed.add(model_hash)
+                self._log.info(
+                    "no file of this model is seen here: its guides are not drawn",
+                    extra={"recognizer": recognizer, "hash": model_hash},
+                )
+        return self._hashed.get(model_hash)
+
+    def _read_files(self) -> None:
+        for place in self._places:
+            # Paths are told as another process sees them, and files may be half written.
+            with suppress(UserError, OSError):
+                for file in model_files(place):
+                    with suppress(UserError, OSError):
+                        model = load_model(file)
+                        self._named[model.name] = self._hashed[model.hash] = model

@@ -1,0 +1,1 @@
+"""The page's server: who is let in, and what its viewers do."""

@@ -1,0 +1,1 @@
+"""Recording, labeling, training, and taking over what was trained."""

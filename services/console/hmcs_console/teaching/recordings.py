@@ -1,0 +1,130 @@
+"""Recordings as the recorder tells of them, and labels it is to write down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hmcs.bus.keys import Keys, Member
+from hmcs.bus.messages import Outline, OutlineQuestion
+from hmcs.bus.session import Answer
+from hmcs.errors import UserError
+from hmcs_console.teaching import takes
+from hmcs_console.teaching.asking import Asking
+from hmcs_console.teaching.takes import Take
+
+READ_S = 30.0
+"""A recorder has so long to read a recording."""
+
+
+class Recordings:
+    """What is shown of recordings; wishes come on the page's threads, all else on the bus' own."""
+
+    def __init__(
+        self,
+        asking: Asking,
+        keys: Keys,
+        recorder: Callable[[], Member | None],
+        put: Callable[[Callable[[], None]], None],
+    ) -> None:
+        """Begin with none; `put` has something done on the bus' thread."""
+        self._asking = asking
+        self._keys = keys
+        self._recorder = recorder
+        self._put = put
+        self._asked = 0
+        self.take = Take()
+        """What is shown now."""
+
+    # --- what the page wishes; on its threads -----------------------------------------------------
+
+    def open(self, name: str) -> None:
+        """Show a recording, the newest where `name` is empty; it is read anew."""
+        self._put(lambda: self._open(name))
+
+    def refresh(self) -> None:
+        """Have the recorder tell anew what there is."""
+        self._put(lambda: self._open(self.take.name))
+
+    def hide(self) -> None:
+        """Show none."""
+        self._put(self._hide)
+
+    def choose(self, begin_s: float, end_s: float) -> None:
+        """Choose a stretch to be labeled."""
+        self._put(lambda: self._show(self.take._replace(chosen_s=(begin_s, end_s))))
+
+    def label(self, state: str) -> None:
+        """Label the chosen stretch."""
+        self._put(lambda: self._edit(lambda take: takes.labeled(take, state)))
+
+    def remove(self) -> None:
+        """Take labels away from the chosen stretch."""
+        self._put(lambda: self._edit(takes.unlabeled))
+
+    def save(self) -> None:
+        """Have the recorder write the labels down."""
+        self._put(self._save)
+
+    # --- on the bus' thread -----------------------------------------------------------------------
+
+    def _show(self, take: Take) -> None:
+        self.take = take
+
+    def _say(self, said: str) -> None:
+        self.take = self.take._replace(said=said)
+
+    def _hide(self) -> None:
+        # What is still being read is not wanted any more.
+        self._asked += 1
+        self.take = takes.hidden(self.take)
+
+    def _open(self, name: str) -> None:
+        member = self._recorder()
+        if member is None:
+            self._say("no recorder is there: start one")
+            return
+        self._say("reading …")
+        self._asked += 1
+        number = self._asked
+
+        def come(answers: list[Answer[Outline]]) -> None:
+            if number != self._asked:
+                return
+            if not answers:
+                self._say(f"the recorder gave no answer within {READ_S:g} s")
+                return
+            try:
+                self.take = takes.opened(self.take, answers[0].body)
+            except UserError as error:
+                self._say(str(error))
+
+        self._asking.ask(
+            self._keys.rpc(member.service, member.instance, "outline"),
+            OutlineQuestion(recording=name),
+            Outline,
+            come,
+            lambda reason: self._say(f"the recorder refused: {reason}"),
+            timeout_s=READ_S,
+        )
+
+    def _edit(self, edit: Callable[[Take], Take]) -> None:
+        if self.take.name:
+            self.take = edit(self.take)
+        else:
+            self._say("open a recording first")
+
+    def _save(self) -> None:
+        member = self._recorder()
+        if not self.take.name or member is None:
+            self._say("open a recording first" if member else "no recorder is there: start one")
+            return
+        asked = takes.saving(self.take)
+        self._say("saving …")
+        self._asking.request(
+            member,
+            "set_labels",
+            asked,
+            lambda said: self._show(takes.saved(self.take, asked, said)),
+            self._say,
+            timeout_s=READ_S,
+        )

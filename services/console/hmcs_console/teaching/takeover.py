@@ -1,0 +1,163 @@
+"""A newcomer takes over: loaded, compared with who is active, activated. A function of time.
+
+As `hmcs deploy` does it: the newcomer runs beside the active recognizer for a while first, and
+whatever is refused on the way leaves active what was active.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+from hmcs.bus.messages import LoadModel, TrainingProgress
+from hmcs_console.seeing.shadows import Agreement
+from hmcs_console.teaching.wishes import Question, activate
+
+Stage = Literal["loading", "comparing", "activating", "done", "failed"]
+UNDER_WAY: tuple[Stage, ...] = ("loading", "comparing", "activating")
+
+
+class Takeover(NamedTuple):
+    """How far a newcomer is."""
+
+    model: str
+    before: str
+    """Who was active as it began; empty where nobody was."""
+    stage: Stage
+    to_ask: tuple[Question, ...] = ()
+    """What is still to be carried out before it is compared, the first of it being asked now."""
+    hurried: bool = False
+    """Nothing is to be compared."""
+    until_s: float = math.inf
+    """It is compared until then, by the local monotonic clock."""
+    agreed: Agreement = Agreement(0, 0)
+    """With who is active, so far."""
+    detail: str = ""
+    """What came of it in the end."""
+
+    @property
+    def under_way(self) -> bool:
+        """Whether it has not ended yet."""
+        return self.stage in UNDER_WAY
+
+
+class Advance(NamedTuple):
+    """A takeover after something happened."""
+
+    takeover: Takeover
+    ask: Question | None = None
+    """To be asked now; its answer is what `answered` or `refused` is told."""
+
+
+class Followed(NamedTuple):
+    """Which recognizers have been active."""
+
+    now: str = ""
+    before: str = ""
+    """Empty where only one has been."""
+
+
+def begun(trained: TrainingProgress | None, active: str) -> Advance:
+    """Return the takeover of what was trained last, beside the active recognizer, if any."""
+    if trained is None or trained.stage != "done":
+        name = "what was trained" if trained is None else trained.model
+        return _failed(Takeover(name, active, "failed"), "nothing was trained yet: train first")
+    takeover = Takeover(trained.model, active, "loading")
+    if trained.model == active:
+        return _failed(
+            takeover, "it bears the name of the active one: train it under another to have both"
+        )
+    load = LoadModel(path=trained.path)
+    # The fixture first: a belief of a model that is not loaded there is refused.
+    to_ask = (
+        Question("fixture_controller", "load_model", load),
+        Question("recognizer", "load_model", load),
+    )
+    return Advance(takeover._replace(to_ask=to_ask), to_ask[0])
+
+
+def answered(takeover: Takeover, detail: str, now_s: float, compare_s: float) -> Advance:
+    """Return what follows once what was asked is carried out; `detail` says what is so now."""
+    if takeover.stage == "activating":
+        return Advance(takeover._replace(stage="done", detail=detail))
+    to_ask = takeover.to_ask[1:]
+    takeover = takeover._replace(to_ask=to_ask)
+    if to_ask:
+        return Advance(takeover, to_ask[0])
+    if takeover.hurried or not takeover.before or compare_s == 0:
+        return _activated(takeover)
+    return Advance(takeover._replace(stage="comparing", until_s=now_s + compare_s))
+
+
+def refused(takeover: Takeover, reason: str) -> Advance:
+    """Return what follows where what was asked was not carried out."""
+    return _failed(takeover, reason)
+
+
+def at(takeover: Takeover, now_s: float, agreed: Agreement, *, there: bool) -> Advance:
+    """Return what follows from the time that went by.
+
+    `agreed` is how the newcomer and the active one agree; `there` whether a recognizer is there.
+    """
+    if takeover.stage != "comparing":
+        return Advance(takeover)
+    if not there:
+        return _failed(takeover, "the recognizer that was to run it is gone")
+    takeover = takeover._replace(agreed=agreed)
+    return _activated(takeover) if now_s >= takeover.until_s else Advance(takeover)
+
+
+def hurried(takeover: Takeover) -> Advance:
+    """Return what follows where nothing more is to be compared."""
+    if takeover.stage == "comparing":
+        return _activated(takeover)
+    return Advance(takeover._replace(hurried=True) if takeover.stage == "loading" else takeover)
+
+
+def called_off(takeover: Takeover) -> Advance:
+    """Return what follows where the newcomer is not wanted after all."""
+    return _failed(takeover, "called off") if takeover.stage == "comparing" else Advance(takeover)
+
+
+def followed(known: Followed, active: str) -> Followed:
+    """Return which recognizers have been active, as one is now; nobody is empty."""
+    return known if active in ("", known.now) else Followed(active, known.now)
+
+
+def said(takeover: Takeover | None, now_s: float) -> str:
+    """Return how far a newcomer is, in words; nothing where there is none."""
+    if takeover is None:
+        return ""
+    name, before = f"**{takeover.model}**", takeover.before
+    match takeover.stage:
+        case "loading":
+            return f"{name} is being loaded …"
+        case "comparing":
+            left_s = math.ceil(max(takeover.until_s - now_s, 0.0))
+            return f"{name} runs beside {before}: {_agreed(takeover)}, active in {left_s} s"
+        case "activating":
+            return f"{name} is being activated …"
+        case "done":
+            compared = f"  \nbeside {before}: {_agreed(takeover)}" if before else ""
+            return f"{name} took over: {takeover.detail}{compared}"
+        case "failed":
+            still = f", {before} is active still" if before else ""
+            return f"{name} did not take over{still}: {takeover.detail}"
+
+
+def _agreed(takeover: Takeover) -> str:
+    same, compared = takeover.agreed
+    if compared:
+        return f"the same likely state in {same / compared:.0%} of {compared} steps"
+    if takeover.stage == "comparing":
+        return "the hand does not move: nothing is compared"
+    return "nothing was compared"
+
+
+def _activated(takeover: Takeover) -> Advance:
+    question = activate(takeover.model)
+    return Advance(takeover._replace(stage="activating"), question)
+
+
+def _failed(takeover: Takeover, reason: str) -> Advance:
+    return Advance(takeover._replace(stage="failed", detail=reason))

@@ -1,0 +1,190 @@
+"""The timeline of a recording: which part of the task each moment was, set after the fact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from hmcs_console.drawing.palette import FASTER, css
+from hmcs_console.seeing.history import limits
+from hmcs_console.serving.buttons import on_change, on_click
+from hmcs_console.teaching.takes import CHOSEN, Lines, Take, band_color, bands, lines, states_of
+
+NONE = "(none)"
+"""What a list says while nothing is in it, or nothing of it is chosen."""
+_HEIGHT_PX = 190
+_SLIDER_STEPS = 1000
+_TRANSPARENT = "66"
+_PATH_M, _CHOSEN_M = 0.004, 0.012
+_NOTHING: Lines = np.zeros((1, 2, 3), dtype=np.float32), np.zeros((1, 2, 3), dtype=np.uint8)
+
+
+class Editing(Protocol):
+    """Who shows recordings and sets their labels; called on the page's threads."""
+
+    def open(self, name: str) -> None:
+        """Show a recording, the newest where `name` is empty."""
+
+    def refresh(self) -> None:
+        """Tell anew what recordings there are."""
+
+    def hide(self) -> None:
+        """Show none."""
+
+    def choose(self, begin_s: float, end_s: float) -> None:
+        """Choose a stretch to be labeled."""
+
+    def label(self, state: str) -> None:
+        """Label the chosen stretch."""
+
+    def remove(self) -> None:
+        """Take labels away from the chosen stretch."""
+
+    def save(self) -> None:
+        """Have the labels written down."""
+
+
+class Timeline:
+    """The controls, in the container that is open now; drawn on one thread."""
+
+    def __init__(
+        self, gui: viser.GuiApi, editing: Editing, use_for_training: Callable[[str], None]
+    ) -> None:
+        self._gui = gui
+        self._editing = editing
+        self._drawn: tuple[Take, tuple[str, ...]] = (Take(), ())
+        self._series: tuple[str, ...] = ()
+        self._plot: viser.GuiUplotHandle | None = None
+        self._slider: viser.GuiMultiSliderHandle[float] | None = None
+        self._choice = gui.add_dropdown("Recording", (NONE,))
+        on_change(self._choice, self._open)
+        on_click(gui.add_button("Refresh", hint="Look what there is now"), editing.refresh)
+        self._shown = gui.add_folder("Labels", visible=False)
+        with self._shown:
+            self._chosen = gui.add_markdown("", order=6.0)
+            self._state = gui.add_dropdown("State", (NONE,), order=10.0)
+            label = gui.add_button("Label", order=11.0, hint="The chosen stretch is this state")
+            on_click(label, self._label)
+            remove = gui.add_button("Remove", order=12.0, hint="The chosen stretch is no state")
+            on_click(remove, editing.remove)
+            save = gui.add_button("Save", order=13.0, hint="Beside the recording, as .labels.csv")
+            on_click(save, editing.save)
+            use = gui.add_button("Use for training", order=14.0)
+            on_click(use, lambda: use_for_training(self._drawn[0].path))
+            on_click(gui.add_button("Hide", order=15.0), editing.hide)
+        self._said = gui.add_markdown("")
+
+    def draw(self, take: Take, states: tuple[str, ...]) -> None:
+        """Draw what is shown of a recording, with the states of the task."""
+        before, states_before = self._drawn
+        if take is before and states == states_before:
+            return
+        self._drawn = take, states
+        if take.said != before.said:
+            self._said.content = take.said
+        options = take.recordings or (NONE,)
+        if not take.name:
+            options = (NONE, *take.recordings)
+        if options != self._choice.options:
+            self._choice.options = options
+        self._choice.value = take.name or NONE  # type: ignore[misc]
+        self._shown.visible = bool(take.name)
+        if not take.name:
+            return
+        named = states_of(take, states)
+        if (named or (NONE,)) != self._state.options:
+            self._state.options = named or (NONE,)
+        if self._slider is None or (take.name, take.duration_s) != (before.name, before.duration_s):
+            self._make_slider(take)
+        if take.chosen_s != before.chosen_s:
+            self._chosen.content = "Chosen: {:.2f} s to {:.2f} s".format(*take.chosen_s)
+        self._draw_bands(take, named, states)
+
+    def _open(self, name: str) -> None:
+        if name != NONE:
+            self._editing.open(name)
+
+    def _label(self) -> None:
+        if self._state.value != NONE:
+            self._editing.label(self._state.value)
+
+    def _make_slider(self, take: Take) -> None:
+        """Its ends cannot be moved while it is there, where pages hold it."""
+        if self._slider is not None:
+            self._slider.remove()
+        with self._shown:
+            self._slider = self._gui.add_multi_slider(
+                "From, to (s)",
+                min=0.0,
+                max=max(take.duration_s, 1e-3),
+                step=max(take.duration_s, 1e-3) / _SLIDER_STEPS,
+                initial_value=take.chosen_s,
+                order=5.0,
+            )
+        on_change(self._slider, lambda chosen: self._editing.choose(*sorted(chosen)))
+
+    def _draw_bands(self, take: Take, named: tuple[str, ...], states: tuple[str, ...]) -> None:
+        data = bands(take, named)
+        scales: dict[str, uplot.Scale] = {
+            "x": uplot.Scale(time=False, auto=False, range=(0.0, max(take.duration_s, 1e-3))),
+            "y": uplot.Scale(auto=False, range=limits(data[1:])),
+        }
+        if self._plot is not None and named == self._series:
+            self._plot.scales = scales
+            self._plot.data = data
+            return
+        self._series = named
+        if self._plot is not None:
+            self._plot.remove()
+        series: tuple[uplot.Series, ...] = (
+            uplot.Series(label="s"),
+            uplot.Series(label="speed, m/s", stroke=css(FASTER), width=1.5),
+            uplot.Series(label="chosen", width=0, fill=css(CHOSEN) + _TRANSPARENT),
+            *(
+                uplot.Series(
+                    label=state, width=0, fill=css(band_color(state, states)) + _TRANSPARENT
+                )
+                for state in named
+            ),
+        )
+        with self._shown:
+            self._plot = self._gui.add_uplot(
+                data, series, scales=scales, height=_HEIGHT_PX, order=1.0
+            )
+
+
+class TakePath:
+    """The way of the hand in a recording, in the scene; drawn on one thread."""
+
+    def __init__(self, scene: viser.SceneApi, origin: NDArray[np.float64]) -> None:
+        """It is laid to begin at `origin`, m, base frame, shape (3,)."""
+        self._origin = origin
+        self._path = _lines(scene, "/recording/path", _PATH_M)
+        self._chosen = _lines(scene, "/recording/chosen", _CHOSEN_M)
+        self._drawn: tuple[Take, tuple[str, ...]] = (Take(), ())
+
+    def draw(self, take: Take, states: tuple[str, ...]) -> None:
+        """Draw what is shown of a recording, colored by its labels; what is chosen is thicker."""
+        before, states_before = self._drawn
+        if take is before and states == states_before:
+            return
+        self._drawn = take, states
+        whole, chosen = lines(take, states, self._origin)
+        _set_lines(self._path, whole)
+        _set_lines(self._chosen, chosen)
+
+
+def _lines(scene: viser.SceneApi, name: str, thickness_m: float) -> viser.LineSegmentsHandle:
+    # Lines that begin with one color for all are never drawn with one for each.
+    return scene.add_line_segments(name, *_NOTHING, thickness=thickness_m, visible=False)
+
+
+def _set_lines(handle: viser.LineSegmentsHandle, pieces: Lines) -> None:
+    handle.visible = len(pieces[0]) > 0
+    if len(pieces[0]):
+        handle.points, handle.colors = pieces

@@ -1,0 +1,1 @@
+"""What stands beside the scene, and what is heard: words, plots, tones."""

@@ -1,0 +1,181 @@
+"""What stands beside the scene: what is so, why, and what can be asked for."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import viser
+
+from hmcs_console.seeing.seen import Picture
+from hmcs_console.serving.buttons import on_click
+from hmcs_console.serving.inbox import pressed_by
+from hmcs_console.teaching import wishes
+from hmcs_console.teaching.timeline import Editing, Timeline
+from hmcs_console.teaching.wishes import Question
+from hmcs_console.telling import words
+from hmcs_console.telling.plots import Plots
+
+_NO_LABEL = "(none)"
+
+
+class Wishes(Protocol):
+    """Who carries out what is asked for on the page; called on the page's threads."""
+
+    @property
+    def recordings(self) -> Editing:
+        """Who shows recordings and sets their labels."""
+
+    def stop(self) -> None:
+        """Let every robot stand."""
+
+    def ask(self, question: Question) -> None:
+        """Have a process do something."""
+
+    def take_over(self) -> None:
+        """Have the fixture follow what was trained last, once it was compared."""
+
+    def activate_now(self) -> None:
+        """Have the fixture follow it without comparing it any longer."""
+
+    def back(self) -> None:
+        """Have the fixture follow the recognizer that was active before."""
+
+    def label(self, state: str) -> None:
+        """Say in which state the hand is from now on; empty ends what was labeled."""
+
+
+class Panel:
+    """The panel; made and drawn on one thread, asked for things on the page's."""
+
+    def __init__(
+        self, gui: viser.GuiApi, carried_out_by: Wishes, states: tuple[str, ...], task: str
+    ) -> None:
+        self._gui = gui
+        self._wishes = carried_out_by
+        self._states = states
+        stop = gui.add_button("Stop", color="red", hint="Every robot stands, whoever drives it")
+        on_click(stop, carried_out_by.stop)
+        self._answer = gui.add_markdown("")
+        tabs = gui.add_tab_group()
+        self.operating = tabs.add_tab("Operate")
+        with self.operating:
+            with gui.add_folder("How to engage, clutch and stop", expand_by_default=False):
+                gui.add_markdown(words.operating())
+            self._operator = gui.add_markdown(words.operates(""))
+            self._doing = gui.add_markdown("")
+            self._why = gui.add_markdown(words.why(None))
+        self._plots_tab = tabs.add_tab("Plots")
+        with self._plots_tab:
+            self._plots = Plots(gui, states)
+        with tabs.add_tab("Recognizers"):
+            self._recognizers = gui.add_markdown("")
+            self._choice = gui.add_dropdown("Recognizer", (_NO_LABEL,))
+            on_click(gui.add_button("Activate"), self._activate)
+            back = gui.add_button("Back", hint="To the one that was active before")
+            on_click(back, carried_out_by.back)
+        self.rules = tabs.add_tab("Task")
+        with tabs.add_tab("Teach"):
+            self._add_teaching(task)
+        with tabs.add_tab("Recordings"):
+            self._timeline = Timeline(gui, carried_out_by.recordings, self._use_for_training)
+        with tabs.add_tab("Services"):
+            self._services = gui.add_markdown("")
+        self._drawn: dict[int, str] = {}
+
+    def draw(self, picture: Picture) -> None:
+        """Write down a moment."""
+        self._take_states(picture.states)
+        self._write(self._operator, words.operates(picture.operator))
+        self._write(self._doing, words.doing(picture.fixture, picture.robot))
+        self._write(self._why, words.why(picture.belief))
+        self._write(self._recognizers, words.recognizers(picture.active, picture.agreement))
+        self._write(self._services, words.services(picture.health))
+        self._write(self._training, words.training(picture.training))
+        self._write(self._answer, picture.answer)
+        self._write(self._takeover, picture.takeover)
+        share = picture.training.share if picture.training is not None else 0.0
+        self._progress.value = 100.0 * share  # type: ignore[misc]
+        self._offer(picture.recognizers)
+        self._plots.draw(picture.rows)
+        self._timeline.draw(picture.take, picture.states)
+
+    def _add_teaching(self, task: str) -> None:
+        gui = self._gui
+        with gui.add_folder("Record"):
+            name = gui.add_text("Name", "", hint="By date and time where it is empty")
+            record = gui.add_button_group("Recording", ("Begin", "End"))
+        with gui.add_folder("Label"):
+            self._label = gui.add_dropdown("State", (_NO_LABEL, *self._states))
+            on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
+        with gui.add_folder("Train"):
+            model = gui.add_text("Model", "taught")
+            task_name = gui.add_text("Task", task)
+            self._files = gui.add_text("Demonstrations", "", hint="Files, as the trainer sees them")
+            kind = gui.add_text("Recognizer", "", hint="The default one where it is empty")
+            find_states = gui.add_checkbox("Find states (no labels needed)", False)
+            train = gui.add_button("Train")
+            on_click(gui.add_button("Cancel"), lambda: self._wishes.ask(wishes.cancel()))
+            self._progress = gui.add_progress_bar(0.0)
+            self._training = gui.add_markdown("")
+            on_click(
+                gui.add_button(
+                    "Activate what was trained",
+                    hint="After it ran for a while beside the one that is active",
+                ),
+                self._wishes.take_over,
+            )
+            on_click(
+                gui.add_button("Activate now", hint="Without comparing it any longer"),
+                self._wishes.activate_now,
+            )
+            self._takeover = gui.add_markdown("")
+
+        async def change_recording(event: viser.GuiEvent[Any]) -> None:
+            with pressed_by(event.client_id):
+                self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
+
+        record.on_click(change_recording)
+        on_click(
+            train,
+            lambda: self._wishes.ask(
+                wishes.train(
+                    model.value,
+                    task_name.value,
+                    self._files.value,
+                    kind.value,
+                    find_states=find_states.value,
+                )
+            ),
+        )
+
+    def _mark(self) -> None:
+        self._wishes.label("" if self._label.value == _NO_LABEL else self._label.value)
+
+    def _activate(self) -> None:
+        if self._choice.value != _NO_LABEL:
+            self._wishes.ask(wishes.activate(self._choice.value))
+
+    def _use_for_training(self, path: str) -> None:
+        there = [file for file in self._files.value.split(", ") if file]
+        if path and path not in there:
+            self._files.value = ", ".join([*there, path])  # type: ignore[misc]
+
+    def _take_states(self, states: tuple[str, ...]) -> None:
+        """Once a recognizer tells what the states are, where no task did."""
+        if states == self._states:
+            return
+        self._states = states
+        self._label.options = (_NO_LABEL, *states)
+        self._plots.remove()
+        with self._plots_tab:
+            self._plots = Plots(self._gui, states)
+
+    def _offer(self, recognizers: tuple[str, ...]) -> None:
+        if recognizers and recognizers != self._choice.options:
+            self._choice.options = recognizers
+
+    def _write(self, place: viser.GuiMarkdownHandle, text: str) -> None:
+        # Markdown is laid out anew on the page whenever it is set.
+        if self._drawn.get(id(place)) != text:
+            self._drawn[id(place)] = text
+            place.content = text
