@@ -17,14 +17,18 @@ from hmcs.bus.messages import (
     Ask,
     Health,
     Label,
+    Record,
     RobotLooks,
     TrainingProgress,
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
+from hmcs.fixtures.rules import rules_of
+from hmcs.task import Task
 from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.hands import Hands
 from hmcs_console.operating.stopping import Stopping
+from hmcs_console.order import order_of
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
@@ -35,6 +39,7 @@ from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
 from hmcs_console.teaching import wishes
 from hmcs_console.teaching.asking import Asking, first_of
+from hmcs_console.teaching.marking import Marking, pressed
 from hmcs_console.teaching.recordings import Recordings
 from hmcs_console.teaching.swapping import Swapping
 from hmcs_console.teaching.wishes import Question
@@ -74,6 +79,9 @@ class Console(Service):
             lambda act: self.page.put(act),
         )
         """What is shown of recordings, and how their labels are set."""
+        self._seen.marking = Marking(
+            None if task is None else order_of(task), task is None or not _cued(task)
+        )
         self._unwatched_until_s = 0.0
         # A trainer finds a task by what the console was told, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
@@ -95,7 +103,7 @@ class Console(Service):
     def start(self) -> None:
         """Listen to everybody, and let viewers operate."""
         bus, keys, seen = self.bus, self.bus.keys, self._seen
-        Listening(bus, seen, self.log)
+        Listening(bus, seen, self.log, self._on_mark)
         bus.subscribe(TrainingProgress, keys.training, self._on_training)
         bus.watch(keys.presence(ANY, ANY), self._on_presence)
         bus.every(TAKE_EVERY_S, self._take)
@@ -172,6 +180,19 @@ class Console(Service):
         """Say in which state the hand is from now on."""
         self.page.put(partial(self._label, state))
 
+    @property
+    def marks_by_pedal(self) -> bool:
+        """Whether the pedal begins the next part of the task."""
+        return self._seen.marking.by_pedal
+
+    def mark_by_pedal(self, on: bool) -> None:
+        """Let the pedal begin the next part of the task, or not."""
+
+        def change() -> None:
+            self._seen.marking = self._seen.marking._replace(by_pedal=on)
+
+        self.page.put(change)
+
     # --- operating --------------------------------------------------------------------------------
 
     def _take(self) -> None:
@@ -194,6 +215,9 @@ class Console(Service):
             self._painter.show(now_s, picture._replace(take=self.recordings.take))
 
     def _ask(self, question: Question) -> None:
+        if isinstance(question.body, Record):
+            # A new recording begins with nothing marked.
+            self._seen.marking = self._seen.marking._replace(now="")
         self._tell(f"asking {question.service} to {question.verb} …")
         self._request(question, self._tell, self._tell)
 
@@ -207,9 +231,17 @@ class Console(Service):
             self._asking.request(member, question.verb, question.body, done, failed)
 
     def _label(self, state: str) -> None:
-        label = wishes.label(state, self._seen.clock, self._seen.step)
+        self._say(wishes.label(state, self._seen.clock, self._seen.step))
+
+    def _on_mark(self, clock: str, step: int) -> None:
+        marking = pressed(self._seen.marking)
+        if marking is not None:
+            self._say(Label(state=marking.now, clock=clock, step=step))
+
+    def _say(self, label: Label) -> None:
         self._labels.put(label)
-        self._tell(f"labeled {state or 'nothing'} from step {label.step} on")
+        self._seen.marking = self._seen.marking._replace(now=label.state)
+        self._tell(f"labeled {label.state or 'nothing'} from step {label.step} on")
 
     def _tell(self, answer: str) -> None:
         self._seen.answer = answer
@@ -248,3 +280,9 @@ class Console(Service):
         }
         there = self._seen.members
         self._seen.health = {member: health for member, health in told.items() if member in there}
+
+
+def _cued(task: Task) -> bool:
+    """Whether the pedal is a cue to the fixture in some state of a task."""
+    rules = rules_of(task)
+    return any(rules.in_state(state.name).compliance == "cue" for state in task.states)

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hmcs_console.drawing.layout import Layout, Order, anchored, laid_out, order_of
+from hmcs_console.drawing.layout import Layout, anchored, laid_out
+from hmcs_console.order import Order, next_part, order_of
 from support.lessons import lesson_task
 
 X, Y, Z = np.eye(3)
@@ -75,3 +76,12 @@ def test_the_order_is_that_of_the_tasks_file() -> None:
     order = order_of(lesson_task())
     assert order.first == "reach"
     assert order.follow["turn-back"] == {"reach": 1.0}
+
+
+def test_each_press_begins_the_likeliest_part_that_follows_and_one_more_ends_the_task() -> None:
+    order = Order("take", {"take": {"bring": 0.8, "set": 0.2}, "bring": {"set": 1.0}, "set": {}})
+    marked, now = [], ""
+    for _ in range(5):
+        now = next_part(order, now)
+        marked.append(now)
+    assert marked == ["take", "bring", "set", "", "take"]

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from hmcs.bus.messages import Belief, Evidence, FixtureState
 from hmcs.motion.paths import Path
 from hmcs.task import Task
-from hmcs_console.seeing.gathered import STEPS, Gathered, beneath, gathered
+from hmcs_console.seeing.gathered import STEPS, Gathered, beneath, gathered, usable
 from hmcs_console.telling import spoken_reasons
-from hmcs_console.telling.reasons import MOST_RIVALS, Reasons, log_ratio, reasons_of, turn, usable
+from hmcs_console.telling.reasons import MOST_RIVALS, Reasons, log_ratio, reasons_of, turn
 from support.lessons import lesson_task
 
 X, Y, Z = np.eye(3)

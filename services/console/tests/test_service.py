@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Belief, Done, Record
+from hmcs.bus.messages import Belief, Done, Record, Step
 from hmcs.bus.service import UserError
 from hmcs.bus.session import RequestRefusedError
 from hmcs_console.operating.handles import Alive, Grabbed, LetGo, Moved
@@ -168,6 +168,30 @@ def test_a_wish_is_carried_out_by_its_process_and_its_answer_is_shown(make_cell:
     cell.service.ask(wishes.record(False, ""))
     cell.until(lambda: "refused: nothing is" in cell.service.answer, "the refusal")
     assert (asked[0], asked[-1]) == (Record(on=True, name="peg"), Record(on=False))
+
+
+def test_the_pedal_of_any_device_marks_the_parts_of_the_task_one_after_another(
+    make_cell: MakeCell, model_file: Path
+) -> None:
+    cell = make_cell(models=(model_file,))
+    steps = cell.other.publisher(Step, cell.other.keys.step)
+    told: list[tuple[str, int]] = []
+    for index, mark in enumerate([False, True, False, True, True, True]):
+        way = np.array([0.01, 0.0, 0.0])
+        steps.put(Step(index=index, position=index * way, displacement=way, mark=mark))
+        if mark:
+            count = len(told) + 1
+            cell.until(lambda count=count: len(cell.labels) >= count, "a label")  # type: ignore[misc]
+            told.append((cell.labels[-1].state, cell.labels[-1].step))
+            assert cell.labels[-1].clock == cell.other.source.boot
+    assert told == [("free", 1), ("in", 3), ("", 4), ("free", 5)]
+    cell.service.mark_by_pedal(False)
+    cell.until(lambda: not cell.service.marks_by_pedal, "the change")
+    way = np.array([0.01, 0.0, 0.0])
+    steps.put(Step(index=6, position=6 * way, displacement=way, mark=True))
+    cell.service.label("in")
+    cell.until(lambda: len(cell.labels) > len(told), "the button's label")
+    assert (cell.labels[-1].state, cell.labels[-1].step) == ("in", 7)
 
 
 def test_a_label_is_published(make_cell: MakeCell) -> None:

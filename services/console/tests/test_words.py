@@ -7,7 +7,9 @@ import pytest
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
+from hmcs_console.order import Order
 from hmcs_console.seeing.shadows import Agreement
+from hmcs_console.teaching.marking import Marking
 from hmcs_console.telling import words
 
 
@@ -163,3 +165,15 @@ def test_how_to_engage_let_go_clutch_and_stop_is_told() -> None:
 def test_who_operates_is_told() -> None:
     assert "desk-page-1" in words.operates("desk-page-1")
     assert "Nobody" in words.operates("")
+
+
+def test_what_is_marked_and_what_the_pedal_would_mark_is_told() -> None:
+    order = Order("take", {"take": {"set": 1.0}, "set": {}})
+    assert words.marking(Marking(order, True)) == (
+        "nothing is marked; the pedal (key P) begins **take**"
+    )
+    assert "now **set**; the pedal (key P) ends the task" in words.marking(
+        Marking(order, True, "set")
+    )
+    assert words.marking(Marking(order, False, "take")) == "now **take**"
+    assert "give the console a task" in words.marking(Marking(None, True))

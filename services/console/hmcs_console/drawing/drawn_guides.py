@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from hmcs.recognition.model import Model
 from hmcs_console.drawing.geometry import line
-from hmcs_console.drawing.layout import Layout, Order, anchored, laid_out, order_of
+from hmcs_console.drawing.layout import Layout, anchored, laid_out
 from hmcs_console.drawing.palette import color_of, faint
+from hmcs_console.order import Order, order_of
 from hmcs_console.seeing.models import gesteme_of, guide_of
 from hmcs_console.seeing.seen import Picture
 

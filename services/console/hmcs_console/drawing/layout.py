@@ -12,18 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.task import Task
+from hmcs_console.order import Order
 
 Point = NDArray[np.float64]
-
-
-class Order(NamedTuple):
-    """In which order a task's states are performed."""
-
-    first: str
-    """The state it most likely begins in."""
-    follow: Mapping[str, Mapping[str, float]]
-    """For each state those that follow it, with their probabilities."""
 
 
 class Layout(NamedTuple):
@@ -33,14 +24,6 @@ class Layout(NamedTuple):
     """Where each state's guide begins, m, base frame, shape (3,)."""
     visited: frozenset[str] = frozenset()
     """States that were active: where their guides lay then is known."""
-
-
-def order_of(task: Task) -> Order:
-    """Return the order a task's file tells."""
-    return Order(
-        max(task.start, key=lambda state: task.start[state]),
-        {state.name: state.next for state in task.states},
-    )
 
 
 def laid_out(order: Order, ways: Mapping[str, Point], start: Point) -> Layout:

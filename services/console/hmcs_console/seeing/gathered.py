@@ -32,3 +32,12 @@ def beneath(belief: Belief, known: Gathered) -> tuple[Evidence, ...]:
     """Return the evidence a belief stands on; of another model than the belief's there is none."""
     told = known.told.get((belief.clock, belief.step), ())
     return tuple(each for each in told if each.model_hash == belief.model_hash)
+
+
+def usable(evidence: Evidence) -> bool:
+    """Whether the arrays of evidence fit one another."""
+    pairs = len(evidence.pair_gesteme)
+    held = evidence.pair_gesteme
+    return (len(evidence.pair_start), len(evidence.log_ratio)) == (pairs, pairs) and (
+        not pairs or (held.min() >= 0 and held.max() < len(evidence.gestemes))
+    )

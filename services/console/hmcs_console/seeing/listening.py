@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from functools import partial
 
 from hmcs.bus.keys import ANY
 from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import Belief, Evidence, FixtureState, Motion, RobotState, Step
 from hmcs.bus.session import Bus, Received
+from hmcs_console.seeing.gathered import usable
 from hmcs_console.seeing.glancing import Glance
 from hmcs_console.seeing.hops import FAST, SLOW, cause_of
 from hmcs_console.seeing.seen import NS_PER_S, Seen
-from hmcs_console.telling.reasons import usable
 
 
 class Listening:
     """Takes in what the loops tell; all of it on the thread that pumps the bus."""
 
-    def __init__(self, bus: Bus, seen: Seen, log: logging.Logger) -> None:
-        """Begin to listen."""
+    def __init__(
+        self, bus: Bus, seen: Seen, log: logging.Logger, marked: Callable[[str, int], None]
+    ) -> None:
+        """Begin to listen; `marked` is told clock and number of each step the pedal marks."""
+        self._marked = marked
         self._bus = bus
         self._seen = seen
         keys = bus.keys
@@ -55,6 +59,8 @@ class Listening:
     def _on_step(self, received: Received[Step]) -> None:
         self._seen.clock = received.envelope.source.boot
         self._seen.step = received.body
+        if received.body.mark:
+            self._marked(received.envelope.source.boot, received.body.index)
         self._in_slow_loop("step", received)
 
     def _on_belief(self, received: Received[Belief]) -> None:

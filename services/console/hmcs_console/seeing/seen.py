@@ -24,6 +24,7 @@ from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.seeing.shadows import Agreement, Shadows
 from hmcs_console.seeing.trails import Pieces, Points, Trail
+from hmcs_console.teaching.marking import Marking
 from hmcs_console.teaching.takes import Take
 
 T = TypeVar("T")
@@ -58,6 +59,8 @@ class Picture(NamedTuple):
     health: dict[Member, Health | None]
     """Of every process that is there; None where it has not told."""
     training: TrainingProgress | None
+    marking: Marking
+    """The part of the task the hand is said to be in."""
     answer: str
     """What came of the last thing that was asked for."""
     operator: str
@@ -83,6 +86,7 @@ class Seen:
         self.members: set[Member] = set()
         self.health: dict[Member, Health] = {}
         self.training: TrainingProgress | None = None
+        self.marking = Marking(None, by_pedal=True)
         self.answer = ""
         self.takeover = ""
         self._rows: Rows = ()
@@ -178,6 +182,7 @@ class Seen:
             looks=self.looks,
             health={member: self.health.get(member) for member in sorted(self.members)},
             training=self.training,
+            marking=self.marking,
             answer=self.answer,
             operator=operator,
             operating_client=client,

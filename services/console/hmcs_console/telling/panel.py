@@ -43,6 +43,13 @@ class Wishes(Protocol):
     def label(self, state: str) -> None:
         """Say in which state the hand is from now on; empty ends what was labeled."""
 
+    @property
+    def marks_by_pedal(self) -> bool:
+        """Whether the pedal begins the next part of the task."""
+
+    def mark_by_pedal(self, on: bool) -> None:
+        """Let the pedal begin the next part of the task, or not."""
+
 
 class Panel:
     """The panel; made and drawn on one thread, asked for things on the page's."""
@@ -91,6 +98,7 @@ class Panel:
         self._write(self._recognizers, words.recognizers(picture.active, picture.agreement))
         self._write(self._services, words.services(picture.health))
         self._write(self._training, words.training(picture.training))
+        self._write(self._marking, words.marking(picture.marking))
         self._write(self._answer, picture.answer)
         self._write(self._takeover, picture.takeover)
         share = picture.training.share if picture.training is not None else 0.0
@@ -107,6 +115,12 @@ class Panel:
         with gui.add_folder("Label"):
             self._label = gui.add_dropdown("State", (_NO_LABEL, *self._states))
             on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
+            pedal = gui.add_checkbox(
+                "Pedal begins the next part",
+                self._wishes.marks_by_pedal,
+                hint="Press it where each part begins, and once more where the last one ends",
+            )
+            self._marking = gui.add_markdown("")
         with gui.add_folder("Train"):
             model = gui.add_text("Model", "taught")
             task_name = gui.add_text("Task", task)
@@ -134,7 +148,12 @@ class Panel:
             with pressed_by(event.client_id):
                 self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
 
+        async def change_pedal(event: viser.GuiEvent[Any]) -> None:
+            with pressed_by(event.client_id):
+                self._wishes.mark_by_pedal(bool(event.target.value))
+
         record.on_click(change_recording)
+        pedal.on_update(change_pedal)
         on_click(
             train,
             lambda: self._wishes.ask(

@@ -120,15 +120,6 @@ def log_ratio(
     return held, None
 
 
-def usable(evidence: Evidence) -> bool:
-    """Whether the arrays of evidence fit one another."""
-    pairs = len(evidence.pair_gesteme)
-    held = evidence.pair_gesteme
-    return (len(evidence.pair_start), len(evidence.log_ratio)) == (pairs, pairs) and (
-        not pairs or (held.min() >= 0 and held.max() < len(evidence.gestemes))
-    )
-
-
 def turn(now: Vector, then: Vector) -> tuple[float, Vector | None]:
     """Return the angle between two unit vectors, (3,), rad, and which way the first is turned.
 

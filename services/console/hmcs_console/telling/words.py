@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
 from hmcs_console.seeing.shadows import Agreement
+from hmcs_console.teaching.marking import Marking
 
 _REASONS = {
     "guiding": "guides: the state is recognized",
@@ -131,4 +132,16 @@ def _process(member: Member, told: Health | None) -> str:
         f"{name}, {told.loop_rate_hz:.0f} Hz  \n"
         f"{'' if told.healthy else '**unhealthy**: '}{told.detail}  \n"
         f"lost {lost}, late {late}, refused {refused}"
+    )
+
+
+def marking(now: Marking) -> str:
+    """Return which part of the task is marked, and what the pedal would mark."""
+    marked = f"now **{now.now}**" if now.now else "nothing is marked"
+    if not now.by_pedal:
+        return marked
+    if now.order is None:
+        return f"{marked}; which part is next nobody knows: give the console a task"
+    return f"{marked}; the pedal (key P) " + (
+        f"begins **{now.next}**" if now.next else "ends the task"
     )
