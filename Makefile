@@ -11,7 +11,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench peers test-browser schemas test-containers clean
+.PHONY: help setup demo test lint bench peers test-browser pictures schemas test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -39,6 +39,12 @@ peers: $(READY) ## install the libraries that studies compare with, beside the r
 test-browser: $(READY) ## drive the operator's page in a chromium, with playwright installed beside the rest
 	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
 	@$(RUN)/python -m pytest -m browser tests/browser
+
+pictures: $(READY) ## take the pictures of the page that stand in docs/ anew, in a chromium
+	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
+	@$(RUN)/python -m pytest -q -m browser tests/browser/test_pictures.py
+	@cp out/browser/page.png out/browser/page-plots.png out/browser/page-teach.png \
+	  out/browser/page-recordings.png docs/
 
 schemas: $(READY) ## rewrite JSON Schemas, golden bytes and the page of all messages
 	@$(RUN)/python -m hmcs.bus.schemas tests/contract

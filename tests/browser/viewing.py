@@ -85,15 +85,22 @@ class Heard:
 class Cell:
     """A console and whoever it shall be with, and somebody who listens to them."""
 
-    def __init__(self, stack: Stack, *others: tuple[Any, ...], task: str | Path = TASK) -> None:
-        """Bring up a console; `others` are services with their flags."""
+    def __init__(
+        self,
+        stack: Stack,
+        *others: tuple[Any, ...],
+        task: str | Path = TASK,
+        console: tuple[Any, ...] = (),
+    ) -> None:
+        """Bring up a console with more flags; `others` are services with theirs."""
         self.stack = stack
         self.bus = stack.open_bus("observer", "o")
         stack.watch(self.bus)
         self.heard = Heard(self.bus)
-        console = stack.start("console", "page", "--port", 0, "--task", task, *SLOW)
-        rest = [stack.start(name, name, *flags) for name, *flags in others]
-        stack.until_ready(console, *rest)
+        flags = ("--port", 0, "--task", task, *SLOW, *console)
+        started = [stack.start("console", "page", *flags)]
+        started += [stack.start(name, name, *its_flags) for name, *its_flags in others]
+        stack.until_ready(*started)
         self.url = self.describe("console", "page")["page"]
 
     def describe(self, service: str, instance: str) -> dict[str, str]:
@@ -106,13 +113,21 @@ class Cell:
 class Viewer:
     """One page, its camera where it is put at the beginning."""
 
-    def __init__(self, browser: Any, cell: Cell, task: str | Path = TASK) -> None:
+    def __init__(
+        self,
+        browser: Any,
+        cell: Cell,
+        task: str | Path = TASK,
+        size: tuple[int, int] = SIZE,
+        coarse: float = COARSE,
+    ) -> None:
         """Begin with an empty page; `open` opens the console's."""
         self.cell = cell
+        self._size = size
         self.requests: list[str] = []
         """Whatever it has asked for, addresses of sockets among it."""
         self._context = browser.new_context(
-            viewport={"width": SIZE[0], "height": SIZE[1]}, device_scale_factor=COARSE
+            viewport={"width": size[0], "height": size[1]}, device_scale_factor=coarse
         )
         self.page = self._context.new_page()
         self.page.set_default_timeout(PAGE_S * 1e3)
@@ -164,8 +179,9 @@ class Viewer:
         right /= np.linalg.norm(right)
         above = np.cross(right, ahead)
         ray = np.asarray(point, dtype=float) - eye
-        px = SIZE[1] / 2 / np.tan(_FIELD_OF_VIEW / 2) / float(ray @ ahead)
-        return SIZE[0] / 2 + px * float(ray @ right), SIZE[1] / 2 - px * float(ray @ above)
+        px = self._size[1] / 2 / np.tan(_FIELD_OF_VIEW / 2) / float(ray @ ahead)
+        width, height = self._size
+        return width / 2 + px * float(ray @ right), height / 2 - px * float(ray @ above)
 
     # --- doing ------------------------------------------------------------------------------------
 
