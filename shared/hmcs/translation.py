@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hmcs.bus import messages
-from hmcs.fixtures.controller import Guides, OperatorSample
+from hmcs.fixtures.exchanged import Guides, OperatorSample
 from hmcs.fixtures.rules import rules_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.fixtures.workspace import regions_of

@@ -12,7 +12,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from bench.figures import Figure
-from hmcs.fixtures.controller import Controller, Guides, OperatorSample
+from hmcs.fixtures.controller import Controller
+from hmcs.fixtures.exchanged import Guides, OperatorSample
 from hmcs.fixtures.meshes import Mesh
 from hmcs.fixtures.regions import Region
 from hmcs.fixtures.rules import Safeguards, rules_of

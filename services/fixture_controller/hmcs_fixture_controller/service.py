@@ -30,8 +30,9 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus, Received
-from hmcs.fixtures.controller import Controller, Fixture, UnknownModelError
+from hmcs.fixtures.controller import Controller
 from hmcs.fixtures.driver import Driver
+from hmcs.fixtures.exchanged import Fixture, UnknownModelError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import guides_of, sample_of, segment_belief_of

@@ -25,8 +25,9 @@ from hmcs.bus.messages import (
     RobotState,
     Step,
 )
-from hmcs.fixtures.controller import Controller, Fixture
+from hmcs.fixtures.controller import Controller
 from hmcs.fixtures.driver import Driver
+from hmcs.fixtures.exchanged import Fixture
 from hmcs.fixtures.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
 from hmcs.recordings.replaying import Replay

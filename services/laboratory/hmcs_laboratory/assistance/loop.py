@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.fixtures.controller import Controller, Fixture, Guides, OperatorSample
+from hmcs.fixtures.controller import Controller
+from hmcs.fixtures.exchanged import Fixture, Guides, OperatorSample
 from hmcs.fixtures.rules import Rules, Safeguards
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.fixtures.workspace import regions_of
