@@ -25,6 +25,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
 from hmcs.fixtures.rules import rules_of
 from hmcs.task import Task
+from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.hands import Hands
 from hmcs_console.operating.stopping import Stopping
@@ -38,7 +39,6 @@ from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
 from hmcs_console.teaching import wishes
-from hmcs_console.teaching.asking import Asking, first_of
 from hmcs_console.teaching.marking import Marking, pressed
 from hmcs_console.teaching.recordings import Recordings
 from hmcs_console.teaching.swapping import Swapping
@@ -163,6 +163,10 @@ class Console(Service):
     def ask(self, question: Question) -> None:
         """Have a process do something."""
         self.page.put(partial(self._ask, question))
+
+    def refuse(self, reason: str) -> None:
+        """Say why nothing is asked for."""
+        self.page.put(partial(self._tell, reason))
 
     def take_over(self) -> None:
         """Have the fixture follow what was trained last, once it was compared."""

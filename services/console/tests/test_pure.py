@@ -229,3 +229,19 @@ def test_states_are_found_in_demonstrations_where_that_is_wished() -> None:
 
 def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:
     assert wishes.record(True, " ").body == Record(on=True)
+
+
+@pytest.mark.parametrize(
+    ("model", "task", "files", "told"),
+    [
+        ("", "demo", "a.csv", "model '' cannot be part of a key"),
+        ("a/b", "demo", "a.csv", "use 1 to 64 letters"),
+        ("mine", " ", "a.csv", "name a task"),
+        ("mine", "demo", " , ", "name the recordings to learn from"),
+    ],
+)
+def test_a_training_nobody_could_carry_out_is_told_and_not_asked_for(
+    model: str, task: str, files: str, told: str
+) -> None:
+    with pytest.raises(wishes.WishError, match=told):
+        wishes.train(model, task, files, "")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Ask
 from hmcs.bus.session import Bus
-from hmcs_console.teaching.asking import WAITING, Asking
+from hmcs_console.asking import WAITING, Asking
 
 ANSWERS_WITHIN_S = 1.0
 

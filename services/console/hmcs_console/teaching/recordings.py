@@ -8,8 +8,8 @@ from hmcs.bus.keys import Keys, Member
 from hmcs.bus.messages import Outline, OutlineQuestion
 from hmcs.bus.session import Answer
 from hmcs.errors import UserError
+from hmcs_console.asking import Asking
 from hmcs_console.teaching import takes
-from hmcs_console.teaching.asking import Asking
 from hmcs_console.teaching.takes import Take
 
 READ_S = 30.0

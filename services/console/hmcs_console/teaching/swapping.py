@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from hmcs_console.asking import first_of
 from hmcs_console.seeing.seen import Seen
 from hmcs_console.seeing.shadows import Agreement
 from hmcs_console.teaching import takeover, wishes
-from hmcs_console.teaching.asking import first_of
 from hmcs_console.teaching.takeover import Advance, Followed, Takeover
 from hmcs_console.teaching.wishes import Question
 

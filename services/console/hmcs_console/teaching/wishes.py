@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from hmcs.bus.keys import KeyNameError, check_name
 from hmcs.bus.messages import (
     ActivateRecognizer,
     Ask,
@@ -14,6 +15,11 @@ from hmcs.bus.messages import (
     Step,
     Train,
 )
+from hmcs.errors import UserError
+
+
+class WishError(UserError):
+    """A wish that nobody could carry out; says what is wrong with it."""
 
 
 class Question(NamedTuple):
@@ -37,8 +43,20 @@ def activate(recognizer: str) -> Question:
 def train(
     model: str, task: str, demonstrations: str, recognizer: str, *, find_states: bool = False
 ) -> Question:
-    """Return the wish for a training; demonstrations are told apart by commas or blanks."""
+    """Return the wish for a training; demonstrations are told apart by commas or blanks.
+
+    Raises WishError where there is no name for the model, or one that cannot be, no task, or
+    nothing to learn from.
+    """
     files = tuple(part for part in re.split(r"[,\s]+", demonstrations) if part)
+    try:
+        check_name("model", model.strip())
+    except KeyNameError as error:
+        raise WishError(f"nothing is trained: {error}") from error
+    if not task.strip():
+        raise WishError("nothing is trained: name a task that comes along, or a task file")
+    if not files:
+        raise WishError("nothing is trained: name the recordings to learn from, e.g. take-1.mcap")
     return Question(
         "trainer",
         "train",

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import viser
 
 from hmcs_console.seeing.seen import Picture
-from hmcs_console.serving.buttons import on_click
+from hmcs_console.serving.buttons import on_change, on_click
 from hmcs_console.serving.inbox import pressed_by
 from hmcs_console.teaching import wishes
 from hmcs_console.teaching.timeline import Editing, Timeline
@@ -30,6 +30,9 @@ class Wishes(Protocol):
 
     def ask(self, question: Question) -> None:
         """Have a process do something."""
+
+    def refuse(self, reason: str) -> None:
+        """Say why nothing is asked for."""
 
     def take_over(self) -> None:
         """Have the fixture follow what was trained last, once it was compared."""
@@ -148,24 +151,24 @@ class Panel:
             with pressed_by(event.client_id):
                 self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
 
-        async def change_pedal(event: viser.GuiEvent[Any]) -> None:
-            with pressed_by(event.client_id):
-                self._wishes.mark_by_pedal(bool(event.target.value))
-
         record.on_click(change_recording)
-        pedal.on_update(change_pedal)
-        on_click(
-            train,
-            lambda: self._wishes.ask(
-                wishes.train(
+        on_change(pedal, self._wishes.mark_by_pedal)
+
+        def ask_to_train() -> None:
+            try:
+                question = wishes.train(
                     model.value,
                     task_name.value,
                     self._files.value,
                     kind.value,
                     find_states=find_states.value,
                 )
-            ),
-        )
+            except wishes.WishError as error:
+                self._wishes.refuse(str(error))
+            else:
+                self._wishes.ask(question)
+
+        on_click(train, ask_to_train)
 
     def _mark(self) -> None:
         self._wishes.label("" if self._label.value == _NO_LABEL else self._label.value)
