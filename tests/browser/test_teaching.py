@@ -18,7 +18,7 @@ import yaml
 from numpy.typing import NDArray
 
 from browser.viewing import Cell, Viewer
-from hmcs.bus.messages import Belief, FixtureState, Handle, Label, Step
+from hmcs.bus.messages import Belief, FixtureState, Handle, Step
 from hmcs.bus.session import Received
 from support.stack import CELL, Stack
 
@@ -47,6 +47,8 @@ TASK = {
 CORNERS_M = np.array([[0.0, 0.0, 0.0], [0.0, -0.35, 0.0], [0.0, -0.35, 0.35], [0.0, 0.0, 0.0]])
 SPEED_M_S = 0.3
 TELL_S = 0.02
+PRESSED_S = 0.1
+"""So long a pedal is down."""
 BEHIND_S = 0.08
 """The hand follows its handle so much later."""
 RECOGNIZED = 0.95
@@ -55,34 +57,30 @@ TRAINED_S = 40.0
 
 
 class Scripted:
-    """Whoever holds the handle: goes round once, and says with labels what that was."""
+    """Whoever holds the handle: goes round once, and presses the pedal where a part begins."""
 
     def __init__(self, cell: Cell) -> None:
         self._cell, bus = cell, cell.bus
         self._handles = bus.publisher(Handle, bus.keys.handle)
-        self._labels = bus.publisher(Label, bus.keys.label)
         self.steps: list[Received[Step]] = []
         bus.subscribe(Step, bus.keys.step, self.steps.append)
 
-    def perform(self, rng: np.random.Generator, *, label: bool) -> dict[int, str]:
+    def perform(self, rng: np.random.Generator, *, mark: bool) -> dict[int, str]:
         """Go round once; return the state that is meant at each step."""
         corners = CORNERS_M * rng.uniform(0.95, 1.05) + np.array([0.6, 0.1, 0.4])
         sides_m = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         ends_s = np.cumsum(sides_m) / SPEED_M_S
         first, begins, turns = len(self.steps), [], [0.0, *ends_s[:-1] + BEHIND_S]
-        began_s = time.monotonic()
+        began_s, pedal_until_s = time.monotonic(), 0.0
         self._tell(corners[0], held=False)
         while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S:
             while len(begins) < len(STATES) and at_s >= turns[len(begins)]:
-                if label:
-                    self._label(STATES[len(begins)])
                 begins.append(self._next)
+                pedal_until_s = at_s + PRESSED_S if mark else 0.0
             share = [np.interp(at_s, [0.0, *ends_s], axis) for axis in corners.T]
-            self._tell(np.array(share), held=True)
+            self._tell(np.array(share), held=True, pedal=at_s < pedal_until_s)
             self._cell.stack.elapse(TELL_S)
         self._tell(corners[-1], held=False)
-        if label:
-            self._label("")
         # What has been made meanwhile is still on its way.
         self._cell.stack.elapse(0.2)
         made = [step.body.index for step in self.steps[first:]]
@@ -92,12 +90,8 @@ class Scripted:
     def _next(self) -> int:
         return self.steps[-1].body.index + 1 if self.steps else 0
 
-    def _tell(self, position: NDArray[np.float64], *, held: bool) -> None:
-        self._handles.put(Handle(operator="script", position=position, dead_man=held))
-
-    def _label(self, state: str) -> None:
-        clock = self.steps[-1].envelope.source.boot if self.steps else ""
-        self._labels.put(Label(state=state, clock=clock, step=self._next))
+    def _tell(self, position: NDArray[np.float64], *, held: bool, pedal: bool = False) -> None:
+        self._handles.put(Handle(operator="script", position=position, dead_man=held, pedal=pedal))
 
 
 def start(stack: Stack, task: Path, folder: Path) -> Cell:
@@ -144,7 +138,7 @@ def test_what_is_shown_three_times_is_recognized_the_fourth(
         viewer.press("Begin")
         file = tmp_path / "taught" / f"show-{number}.mcap"
         viewer.until(lambda file=file: viewer.sees(f"recording to {file}"))
-        hand.perform(rng, label=True)
+        hand.perform(rng, mark=True)
         viewer.press("End")
         viewer.until(lambda file=file: viewer.sees(f"ended {file}"))
         files.append(file)
@@ -154,7 +148,7 @@ def test_what_is_shown_three_times_is_recognized_the_fourth(
     viewer.until(lambda: viewer.sees("done:"), within_s=TRAINED_S)
     viewer.press("Activate what was trained")
     viewer.until(lambda: active(cell))
-    meant = hand.perform(rng, label=False)
+    meant = hand.perform(rng, mark=False)
     stack.until(lambda: set(meant) <= set(beliefs))
     right = [beliefs[step].likely_state == state for step, state in meant.items()]
     print(f"recognized {np.mean(right):.1%} of {len(right)} steps")
