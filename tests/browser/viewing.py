@@ -29,6 +29,8 @@ hardware."""
 PICTURES = Path(__file__).parents[2] / "out" / "browser"
 PAGE_S = 20.0
 """A page without graphics hardware takes its time to be there."""
+START_S = 60.0
+"""A browser beside them leaves services that come up little of the machine."""
 MANY_COLORS = 300
 GRIP_M = 0.13
 """Where an arrow of the handle is held, from its foot."""
@@ -100,7 +102,7 @@ class Cell:
         flags = ("--port", 0, "--task", task, *SLOW, *console)
         started = [stack.start("console", "page", *flags)]
         started += [stack.start(name, name, *its_flags) for name, *its_flags in others]
-        stack.until_ready(*started)
+        stack.until_ready(*started, within_s=START_S)
         self.url = self.describe("console", "page")["page"]
 
     def describe(self, service: str, instance: str) -> dict[str, str]:

@@ -88,7 +88,7 @@ class Stack:
         self.until_ready(process)
         return process
 
-    def until_ready(self, *processes: StackProcess) -> None:
+    def until_ready(self, *processes: StackProcess, within_s: float = DEADLINE_S) -> None:
         """Wait until these are present; fail at once where one has ended instead."""
         wanted = {Member(process.service, process.instance) for process in processes}
 
@@ -97,7 +97,7 @@ class Stack:
                 assert process.running, "\n".join(process.last_lines())
             return wanted <= self.present
 
-        self.until(ready)
+        self.until(ready, within_s)
 
     def until_gone(self, process: StackProcess) -> None:
         """Wait until nobody sees a process any more."""
