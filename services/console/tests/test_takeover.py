@@ -56,13 +56,15 @@ def test_a_newcomer_is_lent_to_the_fixture_then_loaded_then_compared_then_activa
     assert (end.takeover.stage, end.ask) == ("done", None)
     assert takeover.said(end.takeover, 99.0) == (
         "**mine** took over: follows mine  \nbeside old: the same likely state in 97% of 101 steps"
+        "  \nloaded  \nat work"
     )
 
 
-def test_how_it_does_beside_the_active_one_is_told() -> None:
+def test_how_it_does_beside_the_active_one_is_told_with_what_was_said_on_loading_it() -> None:
     comparing = takeover.at(loaded().takeover, 12.4, Agreement(117, 120), there=True).takeover
     assert takeover.said(comparing, 12.4) == (
         "**mine** runs beside old: the same likely state in 98% of 120 steps, active in 3 s"
+        "  \nloaded  \nloaded"
     )
 
 

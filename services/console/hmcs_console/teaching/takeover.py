@@ -26,6 +26,8 @@ class Takeover(NamedTuple):
     stage: Stage
     to_ask: tuple[Question, ...] = ()
     """What is still to be carried out before it is compared, the first of it being asked now."""
+    loaded: tuple[str, ...] = ()
+    """What those said who have loaded it."""
     hurried: bool = False
     """Nothing is to be compared."""
     until_s: float = math.inf
@@ -81,7 +83,7 @@ def answered(takeover: Takeover, detail: str, now_s: float, compare_s: float) ->
     if takeover.stage == "activating":
         return Advance(takeover._replace(stage="done", detail=detail))
     to_ask = takeover.to_ask[1:]
-    takeover = takeover._replace(to_ask=to_ask)
+    takeover = takeover._replace(to_ask=to_ask, loaded=(*takeover.loaded, detail))
     if to_ask:
         return Advance(takeover, to_ask[0])
     if takeover.hurried or not takeover.before or compare_s == 0:
@@ -134,12 +136,14 @@ def said(takeover: Takeover | None, now_s: float) -> str:
             return f"{name} is being loaded …"
         case "comparing":
             left_s = math.ceil(max(takeover.until_s - now_s, 0.0))
-            return f"{name} runs beside {before}: {_agreed(takeover)}, active in {left_s} s"
+            how = f"{_agreed(takeover)}, active in {left_s} s"
+            return "  \n".join([f"{name} runs beside {before}: {how}", *takeover.loaded])
         case "activating":
             return f"{name} is being activated …"
         case "done":
             compared = f"  \nbeside {before}: {_agreed(takeover)}" if before else ""
-            return f"{name} took over: {takeover.detail}{compared}"
+            told = [f"{name} took over: {takeover.detail}{compared}", *takeover.loaded]
+            return "  \n".join(told)
         case "failed":
             still = f", {before} is active still" if before else ""
             return f"{name} did not take over{still}: {takeover.detail}"
