@@ -273,6 +273,17 @@ def train(
 
 
 @app.command()
+def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+    """Let the trainer of a cell give up what it was asked to train; no model is written."""
+    from hmcs.bus.messages import Ask
+    from hmcs_local.asking import asked_of
+    from hmcs_local.observer import open_observer
+
+    with open_observer(router, cell) as bus:
+        typer.echo(asked_of(bus, "trainer", "cancel", Ask(), timeout_s=5.0))
+
+
+@app.command()
 def devices() -> None:
     """List input devices: which are here, which are missing, and what to do about it.
 
