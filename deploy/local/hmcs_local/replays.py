@@ -80,7 +80,7 @@ def replay_in_process(
 
         with _written(files.picture) as unfinished:
             form = files.picture.suffix.lower().removeprefix(".")
-            begun_ns = content.messages[0].log_ns
+            begun_ns = content.first_ns
             draw_replay(unfinished, form, replay, fixture, labels_of(content), begun_ns)
     beliefs, fixtures = compared(replay), fixtures_compared(fixture)
     notes = [*replay.notes, *fixture.notes]

@@ -28,7 +28,7 @@ def export(content: RecordingContent, folder: Path, form: Format) -> list[Path]:
     channels: dict[str, list[Recorded]] = defaultdict(list)
     for message in content.messages:
         channels[message.key].append(message)
-    first_ns = content.messages[0].log_ns if content.messages else 0
+    first_ns = content.first_ns
     written = []
     for key, messages in sorted(channels.items()):
         rows = [

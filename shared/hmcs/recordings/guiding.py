@@ -101,7 +101,7 @@ def guided(
     settings, active = _controller_told(content)
     again = _Again(replay, Safeguards() if settings is None else safeguards_told(settings), active)
     then: dict[tuple[str, int], FixtureState] = {}
-    begun_ns = content.messages[0].log_ns if content.messages else 0
+    begun_ns = content.first_ns
     lasts_ns = max(round(content.duration_s * 1e9), 1)
     for recorded, envelope, message in content.of_any(*HEARD):
         if isinstance(message, FixtureState) and envelope.origin is not None:

@@ -15,9 +15,9 @@ from hmcs_console.drawing.drawn_guides import DrawnGuides
 from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.geometry import wxyz
 from hmcs_console.drawing.palette import DIRECTION, FORCE, Color
+from hmcs_console.drawing.pieces import Pieces, add_pieces, draw_pieces
 from hmcs_console.drawing.robot_model import joints_of, load_robot
 from hmcs_console.seeing.seen import Picture
-from hmcs_console.seeing.trails import Pieces
 
 TRAILS_EVERY_S = 0.1
 """How often trails are drawn: a long one is more to send than all else that moves."""
@@ -25,9 +25,6 @@ _ARROW_M = 0.12
 _M_PER_N = 0.02
 _LONGEST_FORCE_M = 0.3
 _SHORTEST_M = 2e-3
-_NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
-_NO_COLORS = np.zeros((1, 2, 3), dtype=np.uint8)
-"""Lines that begin with one color for all are never drawn with one for each."""
 
 
 class Scene:
@@ -40,8 +37,8 @@ class Scene:
         self._tool = scene.add_frame(
             "/tool", axes_length=0.08, axes_radius=0.004, origin_radius=0.008, visible=False
         )
-        self._robot_trail = self._lines("/trails/robot", 0.004)
-        self._hand_trail = self._lines("/trails/hand", 0.002)
+        self._robot_trail = add_pieces(scene, "/trails/robot", 0.004)
+        self._hand_trail = add_pieces(scene, "/trails/hand", 0.002)
         self._guides = DrawnGuides(scene)
         self._drawn_trails: tuple[Pieces, ...] = ()
         self._trails_s = 0.0
@@ -88,7 +85,7 @@ class Scene:
     def _draw_trails(self, trails: tuple[Pieces, Pieces]) -> None:
         for handle, pieces in zip((self._robot_trail, self._hand_trail), trails, strict=True):
             if not any(pieces is drawn for drawn in self._drawn_trails):
-                _set_lines(handle, pieces)
+                draw_pieces(handle, pieces)
         self._drawn_trails = trails
 
     def _draw_arrows(self, robot: RobotState | None, fixture: FixtureState | None) -> None:
@@ -102,11 +99,6 @@ class Scene:
         _set_arrow(self._direction, robot.tool_position, fixture.preferred_direction * _ARROW_M)
         _set_arrow(self._force, robot.tool_position, force)
 
-    def _lines(self, name: str, thickness_m: float) -> viser.LineSegmentsHandle:
-        return self._server.scene.add_line_segments(
-            name, _NOTHING, _NO_COLORS, thickness=thickness_m, visible=False
-        )
-
     def _arrow(self, name: str, color: Color) -> viser.ArrowsHandle:
         return self._server.scene.add_arrows(
             name,
@@ -117,13 +109,6 @@ class Scene:
             head_length=0.025,
             visible=False,
         )
-
-
-def _set_lines(handle: viser.LineSegmentsHandle, pieces: Pieces) -> None:
-    handle.visible = len(pieces.segments) > 0
-    if len(pieces.segments):
-        handle.points = pieces.segments
-        handle.colors = pieces.colors
 
 
 def _set_arrow(

@@ -19,11 +19,12 @@ from hmcs.bus.messages import (
     TrainingProgress,
 )
 from hmcs_console.drawing.palette import UNKNOWN, Color, color_of
+from hmcs_console.drawing.pieces import Pieces
 from hmcs_console.seeing.gathered import Gathered, beneath, gathered
 from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.seeing.shadows import Agreement, Shadows
-from hmcs_console.seeing.trails import Pieces, Points, Trail
+from hmcs_console.seeing.trails import Points, Trail
 from hmcs_console.teaching.marking import Marking
 from hmcs_console.teaching.takes import Take
 

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hmcs_console.drawing.palette import Color
+from hmcs_console.drawing.pieces import Pieces
 
 Points = NDArray[np.float64]
-
-
-class Pieces(NamedTuple):
-    """Pieces of a way."""
-
-    segments: NDArray[np.float32]
-    """Both ends of each, m, shape (n, 2, 3)."""
-    colors: NDArray[np.uint8]
-    """Of both ends of each, shape (n, 2, 3)."""
 
 
 class Trail:

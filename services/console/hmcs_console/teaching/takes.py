@@ -24,10 +24,9 @@ from hmcs.recordings.stretches import (
     told,
 )
 from hmcs_console.drawing.palette import UNKNOWN, Color, color_of
+from hmcs_console.drawing.pieces import Pieces
 
 Array = NDArray[np.float64]
-Lines = tuple[NDArray[np.float32], NDArray[np.uint8]]
-"""Both ends of each piece, m, shape (n, 2, 3), and their colors, the same shape."""
 
 CHOSEN: Color = (60, 60, 60)
 _WHILE_S = 0.2
@@ -146,31 +145,27 @@ def bands(take: Take, states: Sequence[str]) -> tuple[Array, ...]:
     return (times, speeds, chosen, *(height * (labels == state) for state in states))
 
 
-def lines(take: Take, states: Sequence[str], origin: Array) -> tuple[Lines, Lines]:
+def lines(take: Take, states: Sequence[str], origin: Array) -> tuple[Pieces, Pieces]:
     """Return the way of the hand, laid to begin at `origin`, m, (3,); whole, and what is chosen."""
     if len(take.time_s) < 2:
-        none = np.zeros((0, 2, 3), np.float32), np.zeros((0, 2, 3), np.uint8)
+        none = Pieces(np.zeros((0, 2, 3), np.float32), np.zeros((0, 2, 3), np.uint8))
         return none, none
     way = (take.position - take.position[0] + origin).astype(np.float32)
     pieces = np.stack([way[:-1], way[1:]], axis=1)
     middle = (take.time_s[:-1] + take.time_s[1:]) / 2
-    of_state = {label.state: _color(label.state, states) for label in take.labels}
+    of_state = {label.state: band_color(label.state, states) for label in take.labels}
     colors = np.array(
         [of_state.get(state, UNKNOWN) for state in _labels_at(take, middle)], dtype=np.uint8
     )
     both = np.repeat(colors[:, None], 2, axis=1)
     begin_s, end_s = take.chosen_s
     chosen = (middle >= begin_s) & (middle < end_s)
-    return (pieces, both), (pieces[chosen], both[chosen])
+    return Pieces(pieces, both), Pieces(pieces[chosen], both[chosen])
 
 
 def band_color(state: str, states: Sequence[str]) -> Color:
     """Return the color of a label: that of its state, whatever gesteme it names."""
-    return _color(state, states)
-
-
-def _color(label: str, states: Sequence[str]) -> Color:
-    return color_of(label.partition("/")[0], states)
+    return color_of(state.partition("/")[0], states)
 
 
 def _within(chosen_s: tuple[float, float], duration_s: float) -> tuple[float, float]:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from hmcs_console.drawing.palette import FASTER, css
+from hmcs_console.drawing.pieces import add_pieces, draw_pieces
 from hmcs_console.seeing.history import limits
 from hmcs_console.serving.buttons import on_change, on_click
-from hmcs_console.teaching.takes import CHOSEN, Lines, Take, band_color, bands, lines, states_of
+from hmcs_console.teaching.takes import CHOSEN, Take, band_color, bands, lines, states_of
 
 NONE = "(none)"
 """What a list says while nothing is in it, or nothing of it is chosen."""
@@ -21,7 +22,6 @@ _HEIGHT_PX = 190
 _SLIDER_STEPS = 1000
 _TRANSPARENT = "66"
 _PATH_M, _CHOSEN_M = 0.004, 0.012
-_NOTHING: Lines = np.zeros((1, 2, 3), dtype=np.float32), np.zeros((1, 2, 3), dtype=np.uint8)
 
 
 class Editing(Protocol):
@@ -164,8 +164,8 @@ class TakePath:
     def __init__(self, scene: viser.SceneApi, origin: NDArray[np.float64]) -> None:
         """It is laid to begin at `origin`, m, base frame, shape (3,)."""
         self._origin = origin
-        self._path = _lines(scene, "/recording/path", _PATH_M)
-        self._chosen = _lines(scene, "/recording/chosen", _CHOSEN_M)
+        self._path = add_pieces(scene, "/recording/path", _PATH_M)
+        self._chosen = add_pieces(scene, "/recording/chosen", _CHOSEN_M)
         self._drawn: tuple[Take, tuple[str, ...]] = (Take(), ())
 
     def draw(self, take: Take, states: tuple[str, ...]) -> None:
@@ -175,16 +175,5 @@ class TakePath:
             return
         self._drawn = take, states
         whole, chosen = lines(take, states, self._origin)
-        _set_lines(self._path, whole)
-        _set_lines(self._chosen, chosen)
-
-
-def _lines(scene: viser.SceneApi, name: str, thickness_m: float) -> viser.LineSegmentsHandle:
-    # Lines that begin with one color for all are never drawn with one for each.
-    return scene.add_line_segments(name, *_NOTHING, thickness=thickness_m, visible=False)
-
-
-def _set_lines(handle: viser.LineSegmentsHandle, pieces: Lines) -> None:
-    handle.visible = len(pieces[0]) > 0
-    if len(pieces[0]):
-        handle.points, handle.colors = pieces
+        draw_pieces(self._path, whole)
+        draw_pieces(self._chosen, chosen)

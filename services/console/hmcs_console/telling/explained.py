@@ -11,6 +11,7 @@ from hmcs.recognition.model import Model
 from hmcs_console.seeing.seen import Picture
 from hmcs_console.telling import spoken_reasons, spoken_rules
 from hmcs_console.telling.reasons import reasons_of
+from hmcs_console.telling.writing import write
 
 _LAST = 1e9
 """In what order it stands among all in its container."""
@@ -38,11 +39,5 @@ class Explained:
         task = None if model is None else model.task
         told = reasons_of(picture.belief, picture.evidence, picture.fixture, task, self._paths)
         state = "" if picture.fixture is None else picture.fixture.state
-        _write(self._reasons, spoken_reasons.reasons(told))
-        _write(self._rules, spoken_rules.rules(task, state))
-
-
-def _write(place: viser.GuiMarkdownHandle, text: str) -> None:
-    # Markdown is laid out anew on the page whenever it is set.
-    if place.content != text:
-        place.content = text
+        write(self._reasons, spoken_reasons.reasons(told))
+        write(self._rules, spoken_rules.rules(task, state))

@@ -14,6 +14,7 @@ from hmcs_console.teaching.timeline import Editing, Timeline
 from hmcs_console.teaching.wishes import Question
 from hmcs_console.telling import words
 from hmcs_console.telling.plots import Plots
+from hmcs_console.telling.writing import write
 
 _NO_LABEL = "(none)"
 
@@ -90,20 +91,19 @@ class Panel:
             self._timeline = Timeline(gui, carried_out_by.recordings, self._use_for_training)
         with tabs.add_tab("Services"):
             self._services = gui.add_markdown("")
-        self._drawn: dict[int, str] = {}
 
     def draw(self, picture: Picture) -> None:
         """Write down a moment."""
         self._take_states(picture.states)
-        self._write(self._operator, words.operates(picture.operator))
-        self._write(self._doing, words.doing(picture.fixture, picture.robot))
-        self._write(self._why, words.why(picture.belief))
-        self._write(self._recognizers, words.recognizers(picture.active, picture.agreement))
-        self._write(self._services, words.services(picture.health))
-        self._write(self._training, words.training(picture.training))
-        self._write(self._marking, words.marking(picture.marking))
-        self._write(self._answer, picture.answer)
-        self._write(self._takeover, picture.takeover)
+        write(self._operator, words.operates(picture.operator))
+        write(self._doing, words.doing(picture.fixture, picture.robot))
+        write(self._why, words.why(picture.belief))
+        write(self._recognizers, words.recognizers(picture.active, picture.agreement))
+        write(self._services, words.services(picture.health))
+        write(self._training, words.training(picture.training))
+        write(self._marking, words.marking(picture.marking))
+        write(self._answer, picture.answer)
+        write(self._takeover, picture.takeover)
         share = picture.training.share if picture.training is not None else 0.0
         self._progress.value = 100.0 * share  # type: ignore[misc]
         self._offer(picture.recognizers)
@@ -195,9 +195,3 @@ class Panel:
     def _offer(self, recognizers: tuple[str, ...]) -> None:
         if recognizers and recognizers != self._choice.options:
             self._choice.options = recognizers
-
-    def _write(self, place: viser.GuiMarkdownHandle, text: str) -> None:
-        # Markdown is laid out anew on the page whenever it is set.
-        if self._drawn.get(id(place)) != text:
-            self._drawn[id(place)] = text
-            place.content = text
