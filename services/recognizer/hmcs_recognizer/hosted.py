@@ -25,7 +25,7 @@ class Hosted:
         self._bus, self._log, self._service = bus, log, service
         self._recognizer = recognizer_of(model)
         self._ready = False
-        self._belief = bus.publisher(Belief, bus.keys.belief(model.name))
+        self._belief = bus.publisher(Belief, bus.keys.belief(model.name, bus.source.instance))
         self._evidence = bus.publisher(Evidence, bus.keys.evidence(model.name, bus.source.instance))
         self._feed = StepFeed(bus, log, self._on_step, self._on_restart, memory_steps=memory_steps)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from hmcs.bus.keys import recognizer_in
 from hmcs.bus.messages import LoadModel, Step
 from hmcs.bus.service import Service
 from hmcs.recognition.learning import learn
@@ -130,7 +131,7 @@ def test_it_takes_another_model_while_it_runs(bench: Bench, taught: Taught, tmp_
     bench.until_believed(10 + 2 * 20)
     by_name: dict[str, list[int]] = {taught.model.name: [], "another": []}
     for received in scene.watcher.beliefs:
-        by_name[received.key.split("/")[-2]].append(received.body.step)
+        by_name[recognizer_in(received.key).model].append(received.body.step)
     assert by_name[taught.model.name] == [step.index for step in steps]
     assert by_name["another"] == [step.index for step in steps[10:]]
     told = [r.body for r in scene.watcher.beliefs if r.body.step == steps[-1].index]

@@ -40,7 +40,7 @@ class TaskHmm(Service):
         self._timer: Timer | None = None
         self._degraded = 0
         self._seldom = Seldom(log)
-        self._belief = bus.publisher(Belief, bus.keys.belief(self._model.name))
+        self._belief = bus.publisher(Belief, bus.keys.belief(self._model.name, bus.source.instance))
         self._feed = StepFeed(
             bus,
             log,

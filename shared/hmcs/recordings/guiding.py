@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.bus.counters import Sequences
+from hmcs.bus.keys import recognizer_in
 from hmcs.bus.messages import (
     Belief,
     Envelope,
@@ -25,13 +26,13 @@ from hmcs.bus.messages import (
     RobotState,
     Step,
 )
+from hmcs.controller_feed import ControllerFeed
 from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.driver import Driver
 from hmcs.fixtures.exchanged import Fixture
 from hmcs.fixtures.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
 from hmcs.recordings.replaying import Replay
-from hmcs.translation import guides_of, sample_of, segment_belief_of
+from hmcs.translation import guides_of
 
 HEARD = (Motion, Step, Belief, RobotState, FixtureState)
 CONTROLLER = "fixture_controller/"
@@ -144,14 +145,13 @@ class _Again:
         self.ticks: list[Tick] = []
         """Without what was done then."""
         self.lost = self.refused = self.robots = 0
-        self._controller = Controller(safeguards)
-        self._controller.load(model.name, guides_of(model))
+        controller = Controller(safeguards)
+        controller.load(model.name, guides_of(model))
         if active:
-            self._controller.activate(model.name)
+            controller.activate(model.name)
+        self._feed = ControllerFeed(controller)
         self._name, self._recorded_name = model.name, replay.compared_with
-        self._driver = Driver(safeguards.input_stale_after_s)
         self._sequences = Sequences()
-        self._clock, self._next_step = "", 0
         self._beliefs = {(each.clock, each.step): each for each in replay.beliefs}
 
     def hear(self, now_s: float, recorded: Recorded, envelope: Envelope, message: Message) -> None:
@@ -163,51 +163,42 @@ class _Again:
                 self._stepped(now_s, envelope, message)
             case RobotState():
                 self.robots += 1
-                place, turned = message.tool_position, message.tool_orientation
-                self._controller.robot_moved(now_s, place, turned)
-            case Belief() if recorded.key.split("/")[-2] == self._recorded_name:
+                self._feed.on_robot(now_s, envelope.source, message, ())
+            case Belief() if recognizer_in(recorded.key).model == self._recorded_name:
                 self._believed(message.clock, message.step)
 
     def _sampled(
         self, now_s: float, recorded: Recorded, envelope: Envelope, motion: Motion
     ) -> None:
-        boot, number = envelope.source.boot, envelope.seq
-        self.lost += self._sequences.note(recorded.key, boot, number) or 0
-        if self._driver.heard(now_s, boot, number) != "accepted":
+        source, number = envelope.source, envelope.seq
+        lost = self._sequences.note(recorded.key, source.boot, number)
+        self.lost += lost or 0
+        made = None
+        if lost is not None:
+            made = self._feed.on_motion(now_s, source, number, motion, envelope.origin)
+        if made is None:
             self.refused += 1
             return
-        self._follow(boot)
-        made = self._controller.sampled(now_s, sample_of(motion, number, envelope.origin))
-        self.ticks.append(Tick(recorded.log_ns, boot, number, _would_do(made), None))
+        self.ticks.append(Tick(recorded.log_ns, source.boot, number, _would_do(made), None))
 
     def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
         """Take a step, and the belief after it where none was recorded that says when it came."""
-        boot = envelope.source.boot
-        if boot != self._clock and self._clock and not self._driver.admits(now_s, boot):
+        source = envelope.source
+        if self._feed.on_step(now_s, source, step, envelope.origin) != "taken":
             return
-        self._follow(boot)
-        if step.index < self._next_step:
-            return
-        self._next_step = step.index + 1
-        number = None if envelope.origin is None else envelope.origin.seq
-        self._controller.stepped(now_s, step.index, step.position, step.displacement, number)
-        believed = self._beliefs.get((boot, step.index))
+        believed = self._beliefs.get((source.boot, step.index))
         if believed is not None and believed.recorded is None:
-            self._believed(boot, step.index)
+            self._believed(source.boot, step.index)
 
     def _believed(self, clock: str, step: int) -> None:
         """Take the replayed belief of a step."""
         believed = self._beliefs.get((clock, step))
-        if believed is None or clock != self._clock:
+        if believed is None:
             return
-        self._controller.believed(self._name, segment_belief_of(believed.replayed))
-        if not self._controller.active:
-            self._controller.activate(self._name)
-
-    def _follow(self, boot: str) -> None:
-        if boot != self._clock:
-            self._clock, self._next_step = boot, 0
-            self._controller.forget()
+        verdict = self._feed.on_belief(self._name, believed.replayed)
+        controller = self._feed.controller
+        if verdict in ("taken", "early") and not controller.active:
+            controller.activate(self._name)
 
 
 def _notes(

@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple, cast
 
+from hmcs.bus.keys import recognizer_in
 from hmcs.bus.messages import Belief, Evidence, Step
 from hmcs.recognition.layered import LayeredRecognizer, Layers, Precision
 from hmcs.recognition.model import Model
@@ -184,7 +185,7 @@ def _recorded(content: RecordingContent, model: Model) -> tuple[str, dict[tuple[
     by_name: dict[str, dict[tuple[str, int], Belief]] = {}
     hashes: dict[str, str] = {}
     for logged, _, belief in content.of(Belief):
-        name = logged.key.split("/")[-2]
+        name = recognizer_in(logged.key).model
         by_name.setdefault(name, {})[belief.clock, belief.step] = belief
         hashes[name] = belief.model_hash
     if not by_name:
