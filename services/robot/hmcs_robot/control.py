@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.regions import NOTHING, Candidates
 from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Array, Pose
 from hmcs_robot.limits import (
@@ -23,6 +24,7 @@ from hmcs_robot.limits import (
     shortened,
     speed_scale,
     within_acceleration,
+    within_planes,
     within_speed,
     within_walls,
 )
@@ -37,6 +39,11 @@ class Tuning:
     slowest_share: float = 0.25
     """On its way into a singularity (smallest singular value below 2λ) the tool slows down in
     proportion, never below this share of its speed."""
+    singularity_memory_s: float = 0.25
+    """How fast it is found out whether the arm is on its way into a singularity: at once would
+    switch on and off from tick to tick where an arm is pushed on at the end of its reach."""
+    singularity_closing_per_s: float = 0.02
+    """An arm whose smallest singular value falls so fast is surely on its way into one."""
     correction_per_s: float = 10.0
     """Rate at which the tool is drawn to its reference pose, and a standing arm to its place."""
     largest_lag_m: float = 0.005
@@ -55,8 +62,10 @@ class Following(NamedTuple):
     """Where the tool should be by now."""
     twist: Array
     """The limited velocity it follows, shape (6,)."""
-    smallest: float = 0.0
-    """Singular value of the Jacobian at the tick before."""
+    smallest: float | None = None
+    """Singular value of the Jacobian at the tick before; None at the first."""
+    into_singularity: float = 0.0
+    """How surely the arm is on its way into a singularity, 0 to 1."""
 
 
 class Standing(NamedTuple):
@@ -74,8 +83,8 @@ class Motion(NamedTuple):
     carried: Following | Standing
     """To be passed to the next tick."""
     limited: tuple[str, ...]
-    """The limits that shape the motion: `speed`, `acceleration`, `workspace`, `singularity`,
-    `joint_speed`, `joint_1` …, `contact`."""
+    """The limits that shape the motion: `speed`, `acceleration`, `workspace`, `region`,
+    `singularity`, `joint_speed`, `joint_1` …, `contact`."""
 
     @property
     def reference_twist(self) -> Array:
@@ -106,40 +115,46 @@ def follow(
     limits: Limits,
     tuning: Tuning,
     period_s: float,
+    planes: Candidates = NOTHING,
 ) -> Motion:
     """Return the motion that follows `twist`, m/s and rad/s, shape (6,), within all limits.
 
     The speed limits keep the direction of the linear and of the angular part; a wall of the
-    workspace takes away the part that leads out; joint ranges, joint speeds and contacts slow the
-    motion as a whole, so that they never turn the tool from the commanded direction. What draws
-    the tool to its reference and a redundant arm to its `posture` (n,) gets what is left: it never
-    holds the commanded motion up.
+    workspace takes away the part that leads out, and a plane before a forbidden region the part
+    that leads in. Joint ranges, joint speeds and contacts slow the motion as a whole, so that they
+    never turn the tool from the commanded direction. After all of these the reference changes
+    within the acceleration limits; only ranges, walls, planes and contacts may brake harder. What
+    draws the tool to its reference and a redundant arm to its `posture` (n,) gets what is left: it
+    never holds the commanded motion up.
     """
     if not isinstance(carried, Following):
         carried = Following(arm.tool, np.zeros(6))
     fast_enough = within_speed(twist, limits)
-    reachable = within_acceleration(fast_enough, carried.twist, limits, period_s)
-    wanted = within_walls(reachable, arm.tool.position, limits)
+    walled = within_walls(fast_enough, arm.tool.position, limits)
+    admitted = within_planes(walled, planes, limits)
     inverse = _Inverse(arm.jacobian, tuning.damping)
-    walled = _differ(wanted, reachable)
     clear = inverse.smallest / (2 * tuning.damping)
-    if inverse.smallest < carried.smallest:
-        wanted = wanted * min(1.0, max(clear, tuning.slowest_share))
+    into = _into_singularity(inverse.smallest, carried, tuning, period_s)
+    slowed = admitted * (1.0 - into * (1.0 - min(1.0, max(clear, tuning.slowest_share))))
+
+    bounds = bounds_of(arm, limits, planes)
+    no_motion = np.zeros_like(arm.joint_positions)
+    scale, bound = bounds.scale(no_motion, inverse.velocities(slowed))
+    wanted = within_acceleration(scale * slowed, carried.twist, limits, period_s)
+    led = inverse.velocities(wanted)
+    hard_scale, hard_bound = bounds.hard.scale(no_motion, led)
 
     lag = _lag(arm.tool, carried.pose, tuning)
     drawn = within_speed(wanted + tuning.correction_per_s * lag, limits)
-    drawn = within_walls(drawn, arm.tool.position, limits)
-    bounds = bounds_of(arm, limits)
-    led = inverse.velocities(wanted)
-    scale, bound = bounds.scale(np.zeros_like(led), led)
+    drawn = within_planes(within_walls(drawn, arm.tool.position, limits), planes, limits)
     aside = inverse.velocities(drawn - wanted) + inverse.within_null_space(
         tuning.posture_per_s * (posture - arm.joint_positions)
     )
-    aside_scale, _ = bounds.scale(scale * led, aside)
-    velocities = scale * led + aside_scale * aside
+    aside_scale, _ = bounds.scale(hard_scale * led, aside)
+    velocities = hard_scale * led + aside_scale * aside
     slowing = speed_scale(arm.jacobian @ velocities, limits)
 
-    followed = slowing * scale * wanted
+    followed = slowing * hard_scale * wanted
     pose = Pose(
         arm.tool.position + lag[:3] + followed[:3] * period_s,
         quaternions.turned(
@@ -148,16 +163,30 @@ def follow(
     )
     limited = (
         *(("speed",) if _differ(fast_enough, twist) else ()),
-        *(("acceleration",) if _differ(reachable, fast_enough) else ()),
-        *(("workspace",) if walled else ()),
+        *(("workspace",) if _differ(walled, fast_enough) else ()),
+        *(("region",) if _differ(admitted, walled) else ()),
         *(("singularity",) if clear < 1.0 else ()),
         *bound,
+        *(("acceleration",) if _differ(wanted, scale * slowed) else ()),
+        *hard_bound,
     )
     return Motion(
         slowing * velocities,
-        Following(pose, followed, inverse.smallest),
+        Following(pose, followed, inverse.smallest, into),
         tuple(dict.fromkeys(limited)),
     )
+
+
+def _into_singularity(
+    smallest: float, carried: Following, tuning: Tuning, period_s: float
+) -> float:
+    """Return how surely the arm is on its way into a singularity, 0 to 1."""
+    closing = 0.0
+    if carried.smallest is not None:
+        falls_per_s = (carried.smallest - smallest) / period_s
+        closing = min(1.0, max(0.0, falls_per_s / tuning.singularity_closing_per_s))
+    share = min(1.0, period_s / tuning.singularity_memory_s)
+    return carried.into_singularity + share * (closing - carried.into_singularity)
 
 
 def _lag(tool: Pose, reference: Pose, tuning: Tuning) -> Array:

@@ -119,7 +119,16 @@ class TaskHmm(Service):
         if self._timer is not None:
             self._timer.cancel()
         due_ns = self._gathering.due_ns
-        self._timer = None if due_ns is None else self.bus.at(due_ns, self._release)
+        self._timer = None if due_ns is None else self.bus.at(due_ns, self._on_deadline)
+
+    def _on_deadline(self) -> None:
+        # What arrived before the deadline may still wait to be handled: it goes first.
+        now_ns = time.monotonic_ns()
+        self.bus.soon(lambda: self._on_caught_up(now_ns))
+
+    def _on_caught_up(self, now_ns: int) -> None:
+        self._gathering.caught_up(now_ns)
+        self._release()
 
     def _named(self, gestemes: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self._model.gesteme_names[g] for g in gestemes)
