@@ -39,11 +39,9 @@ class Tuning:
     slowest_share: float = 0.25
     """On its way into a singularity (smallest singular value below 2λ) the tool slows down in
     proportion, never below this share of its speed."""
-    singularity_memory_s: float = 0.25
-    """How fast it is found out whether the arm is on its way into a singularity: at once would
-    switch on and off from tick to tick where an arm is pushed on at the end of its reach."""
-    singularity_closing_per_s: float = 0.02
-    """An arm whose smallest singular value falls so fast is surely on its way into one."""
+    surely_into: float = 0.3
+    """Cosine between a motion and the steepest way into a singularity from which on it slows down
+    fully; below it slows down less, so that nothing switches on and off."""
     correction_per_s: float = 10.0
     """Rate at which the tool is drawn to its reference pose, and a standing arm to its place."""
     largest_lag_m: float = 0.005
@@ -62,10 +60,6 @@ class Following(NamedTuple):
     """Where the tool should be by now."""
     twist: Array
     """The limited velocity it follows, shape (6,)."""
-    smallest: float | None = None
-    """Singular value of the Jacobian at the tick before; None at the first."""
-    into_singularity: float = 0.0
-    """How surely the arm is on its way into a singularity, 0 to 1."""
 
 
 class Standing(NamedTuple):
@@ -134,7 +128,7 @@ def follow(
     admitted = within_planes(walled, planes, limits)
     inverse = _Inverse(arm.jacobian, tuning.damping)
     clear = inverse.smallest / (2 * tuning.damping)
-    into = _into_singularity(inverse.smallest, carried, tuning, period_s)
+    into = min(1.0, max(0.0, inverse.into_singularity(admitted) / tuning.surely_into))
     slowed = admitted * (1.0 - into * (1.0 - min(1.0, max(clear, tuning.slowest_share))))
 
     bounds = bounds_of(arm, limits, planes)
@@ -172,21 +166,9 @@ def follow(
     )
     return Motion(
         slowing * velocities,
-        Following(pose, followed, inverse.smallest, into),
+        Following(pose, followed),
         tuple(dict.fromkeys(limited)),
     )
-
-
-def _into_singularity(
-    smallest: float, carried: Following, tuning: Tuning, period_s: float
-) -> float:
-    """Return how surely the arm is on its way into a singularity, 0 to 1."""
-    closing = 0.0
-    if carried.smallest is not None:
-        falls_per_s = (carried.smallest - smallest) / period_s
-        closing = min(1.0, max(0.0, falls_per_s / tuning.singularity_closing_per_s))
-    share = min(1.0, period_s / tuning.singularity_memory_s)
-    return carried.into_singularity + share * (closing - carried.into_singularity)
 
 
 def _lag(tool: Pose, reference: Pose, tuning: Tuning) -> Array:
@@ -207,8 +189,43 @@ class _Inverse:
     def __init__(self, jacobian: Array, damping: float) -> None:
         left, singular, right = np.linalg.svd(jacobian)
         self.smallest = float(singular[-1])
+        self._jacobian, self._damping = jacobian, damping
+        self._into, self._joints = left[:, -1], right[5]
+        """Of the smallest singular value: what the tool cannot do, and what the joints would."""
         self._inverse = right[:6].T @ ((singular / (singular**2 + damping**2))[:, None] * left.T)
         self._null_space = right[6:]
+
+    def into_singularity(self, twist: Array) -> float:
+        """Return the cosine between the joints' motion for `twist` and the steepest way into the
+        nearest singularity; negative where it leads out.
+
+        The joints are taken as if they were damped no more than at their fastest, 1/2λ: what
+        damping holds back goes into the singularity all the same.
+        """
+        held_back = 1.0 / (2.0 * self._damping) - self.smallest / (
+            self.smallest**2 + self._damping**2
+        )
+        joints = self.velocities(twist) + self._joints * float(self._into @ twist) * held_back
+        steepest = -self._growth()
+        size = float(np.linalg.norm(joints) * np.linalg.norm(steepest))
+        return float(joints @ steepest) / size if size > 0 else 0.0
+
+    def _growth(self) -> Array:
+        """Return how the smallest singular value grows with each joint, (n,): uᵀ ∂J/∂q v.
+
+        ∂Jᵢ/∂qⱼ is ωⱼ × (vᵢ, ωᵢ) for a joint j before i, and (ωᵢ × vⱼ, 0) for one after it.
+        """
+        linear, angular = self._jacobian[:3].T, self._jacobian[3:].T
+        along, turning = self._into[:3], self._into[3:]
+        growth = np.zeros(len(linear))
+        for i, share in enumerate(self._joints):
+            before, after = slice(0, i + 1), slice(i + 1, None)
+            growth[before] += share * (
+                np.cross(angular[before], linear[i]) @ along
+                + np.cross(angular[before], angular[i]) @ turning
+            )
+            growth[after] += share * (np.cross(angular[i], linear[after]) @ along)
+        return growth
 
     def velocities(self, twist: Array) -> Array:
         """Return the joint velocities (n,) for `twist`."""

@@ -94,10 +94,9 @@ class Robot(Service):
             return False, "the control process has ended"
         if snapshot is None:
             return True, "the arm has not moved yet"
-        late = f"; {snapshot.late_ticks} late control ticks" if snapshot.late_ticks else ""
         if snapshot.stop == "none":
-            return True, f"following commands{late}"
-        return True, f"standing: {snapshot.stop}{late}"
+            return True, "following commands"
+        return True, f"standing: {snapshot.stop}"
 
     def facts(self) -> dict[str, str]:
         """Return which robot this is."""
@@ -107,6 +106,7 @@ class Robot(Service):
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
             "speed_limit_m_s": f"{self._task.robot.speed_limit_m_s:g}",
             "control_priority": self._room.priority,
+            "late_ticks": str(self._snapshot.late_ticks if self._snapshot else 0),
         }
 
     def close(self) -> None:
