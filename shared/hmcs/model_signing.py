@@ -90,5 +90,7 @@ def _library() -> tuple[Any, Any]:
         from cryptography.hazmat.primitives import serialization
         from cryptography.hazmat.primitives.asymmetric import ed25519
     except ImportError as error:
-        raise SignatureError(f"models are to be signed, but cryptography is missing: {_INSTALL}") from error  # noqa: E501
+        raise SignatureError(
+            f"models are to be signed, but cryptography is missing: {_INSTALL}"
+        ) from error  # noqa: E501
     return serialization, ed25519
