@@ -5,7 +5,7 @@ asks, one JSON line answers:
 
     {"start": SERVICE, "command": [...] or null}    {"instance": NAME}
     {"stop": INSTANCE}                              {"exit_code": N}
-    {"runs": INSTANCE}                              {"runs": true or false}
+    {"runs": INSTANCE}                              {"runs": true or false, "command": [...]}
 
 or `{"error": TEXT}`. Both sides see to it that the other is this user.
 """
@@ -130,7 +130,9 @@ class ControlServer:
                     return {"instance": process.instance}
                 case _Runs():
                     known = self._stack.processes.get(request.runs)
-                    return {"runs": known is not None and known.running}
+                    if known is None or not known.running:
+                        return {"runs": False, "command": []}
+                    return {"runs": True, "command": list(known.command)}
                 case _Stop():
                     if request.stop not in self._stack.processes:
                         return {"error": f"{request.stop!r} was not started here"}
@@ -158,6 +160,10 @@ class Control:
     def owns(self, instance: str) -> bool:
         """Return whether it started `instance` and that still runs."""
         return bool(self._ask({"runs": instance})["runs"])
+
+    def command(self, instance: str) -> tuple[str, ...]:
+        """Return the command of an instance it started and that still runs; empty for any other."""
+        return tuple(self._ask({"runs": instance})["command"])
 
     def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         path = control_path(self._folder)

@@ -7,9 +7,9 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 
 from hmcs_local.control import ControlServer
+from hmcs_local.interrupts import interruptible
 from hmcs_local.log_lines import readable
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import LocalStack
@@ -148,27 +148,6 @@ def _ending(code: int) -> str:
         return f"killed by {signal.Signals(-code).name}"
     except ValueError:  # a real-time signal has a number alone
         return f"killed by signal {-code}"
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into KeyboardInterrupt, as Ctrl-C does; a second one changes nothing.
-
-    Whoever stops the stack is not to be stopped half-way: its end is bounded by the graces.
-    """
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        for each in numbers:
-            signal.signal(each, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, interrupt) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def run_up(

@@ -34,6 +34,16 @@ def member_named(keys: Keys, token: str) -> Member | None:
         return None
 
 
+def possible(member: Member) -> bool:
+    """Return whether a process can be called so: an answer may say anything of its sender."""
+    try:
+        check_name("service", member.service)
+        check_name("instance", member.instance)
+    except KeyNameError:
+        return False
+    return True
+
+
 def model_named(keys: Keys, token: str) -> str:
     """Return the model of a member token whose name is possible; empty for a presence token."""
     chunks = token.removeprefix(f"{PREFIX}/{keys.cell}/").split("/")
