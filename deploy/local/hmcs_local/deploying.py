@@ -174,7 +174,8 @@ def active_model(bus: Bus) -> str:
     }
     if len(set(followed.values())) > 1:
         told = ", ".join(
-            f"{plain(instance)} {plain(model) or 'none'}" for instance, model in followed.items()
+            f"{plain(instance)} {plain(model) or 'none'}"
+            for instance, model in sorted(followed.items())
         )
         raise DeployError(
             f"fixture controllers follow different models ({told}): let all follow one first, by "

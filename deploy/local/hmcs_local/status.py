@@ -112,7 +112,7 @@ def show_status(bus: Bus, console: Console, *, once: bool) -> bool:
         while True:  # until Ctrl-C
             before, now = now, _look_again(bus, _LOOK_EVERY_S)
             live.update(_picture(bus, now, before, console.width), refresh=True)
-            now = _remembering(now, before)
+            now = remembering(now, before)
 
 
 def _look_again(bus: Bus, after_s: float) -> Observation:
@@ -122,8 +122,11 @@ def _look_again(bus: Bus, after_s: float) -> Observation:
     return observe(bus)
 
 
-def _remembering(now: Observation, before: Observation) -> Observation:
-    """Return a look that still knows who spoke last for models that are followed."""
+def remembering(now: Observation, before: Observation) -> Observation:
+    """Return a look that still knows who spoke last for each model that is followed.
+
+    So that `remarks` can name them as long as nobody else runs that model.
+    """
     kept = {
         model: before.speakers.get(model, ())
         for _, model in _followed(now.sightings)

@@ -166,7 +166,7 @@ def test_who_asks_letter_by_letter_holds_nobody_up(
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(str(control_path(stack.folder)))
             deadline_s = time.monotonic() + 30
-            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            with contextlib.suppress(ConnectionError):
                 while True:
                     assert time.monotonic() < deadline_s, "it is still listened to"
                     connection.sendall(b" ")
@@ -180,7 +180,7 @@ def test_another_user_is_not_answered(stack: LocalStack, served: Served) -> None
     path, here = control_path(stack.folder), os.getuid()
 
     def stop_a() -> bytes:
-        with socket.socket(socket.AF_UNIX) as connection, contextlib.suppress(BrokenPipeError):
+        with socket.socket(socket.AF_UNIX) as connection, contextlib.suppress(ConnectionError):
             connection.settimeout(30)
             connection.connect(str(path))
             connection.sendall(b'{"stop": "a-1"}\n')
