@@ -16,8 +16,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
 from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import Ask, Belief, Description
 from hmcs.bus.session import Bus, Received, RequestRefusedError
@@ -25,40 +23,14 @@ from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.shown import plain
-from hmcs.whole_files import written_whole
 from hmcs_local import swap
 from hmcs_local.control import Control
+from hmcs_local.deployments import Deployed, DeployError, History, read_history, write_history
 from hmcs_local.observer import speakers
 
 READY_WITHIN_S = 15.0
 SERVICE = "recognizer"
 _LOOK_EVERY_S = 0.05
-
-
-class DeployError(UserError):
-    """A model that was not activated; what was active is active still."""
-
-
-class Deployed(BaseModel):
-    """A model that was active, and where it came from."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    model: str
-    path: str = ""
-    """Of its file; empty where it was not deployed but part of the stack."""
-    instance: str = ""
-    """Of the recognizer that runs it; empty where it is part of the stack."""
-
-
-class History(BaseModel):
-    """What was deployed in a folder, oldest first; the last one is active."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    deployed: tuple[Deployed, ...] = ()
-    shadow: Deployed | None = None
-    """A newcomer that was started and has neither taken over nor been stopped yet."""
 
 
 class Agreement(NamedTuple):
@@ -73,30 +45,6 @@ class Agreement(NamedTuple):
         if not self.steps:
             return "the hand did not move: nothing could be compared"
         return f"the same likely state in {self.alike} of {self.steps} steps"
-
-
-def read_history(folder: Path) -> History:
-    """Return what was deployed in the folder of `hmcs up`.
-
-    Raises DeployError where the file that says so cannot be understood.
-    """
-    file = _history_file(folder)
-    if not file.is_file():
-        return History()
-    try:
-        return History.model_validate_json(file.read_text(encoding="utf-8"))
-    except (ValidationError, OSError) as error:
-        raise DeployError(f"{file}: cannot be understood, remove it: {error}") from None
-
-
-def write_history(folder: Path, history: History) -> None:
-    """Write what was deployed, whole or not at all; raises DeployError where it cannot be."""
-    file = _history_file(folder)
-    try:
-        with written_whole(file) as unfinished:
-            unfinished.write_text(history.model_dump_json(indent=2), encoding="utf-8")
-    except OSError as error:
-        raise DeployError(f"{file}: cannot be written: {error.strerror or error}") from error
 
 
 def deploy(
@@ -335,7 +283,3 @@ def _let_go(control: Control, old: Deployed, tell: Callable[[str], None]) -> Non
 def _runs(control: Control, deployed: Deployed) -> bool:
     """Whether it still runs: under its name, but in another `hmcs up`, something else may run."""
     return bool(deployed.instance) and deployed.path in control.command(deployed.instance)
-
-
-def _history_file(folder: Path) -> Path:
-    return folder / "deployed.json"
