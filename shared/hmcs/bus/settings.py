@@ -50,6 +50,9 @@ class ServiceSettings(BaseSettings):
     """Which one of its kind this process is; a short random name by default."""
     direct: bool = False
     """Talk to other direct processes without the router's hop, once it has introduced them."""
+    open_to_network: bool = False
+    """Let a direct process be reached from other hosts, too. There is no encryption and no
+    password: everybody who reaches its port can move the robot."""
     connect_timeout_s: float | None = Field(default=None, gt=0)
     """How long to wait for a router; for ever by default."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
@@ -72,6 +75,7 @@ class ServiceSettings(BaseSettings):
             router=self.router,
             cell=self.cell,
             direct=self.direct,
+            open_to_network=self.open_to_network,
             connect_timeout_s=self.connect_timeout_s,
         )
 
