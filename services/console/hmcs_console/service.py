@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -30,9 +29,11 @@ from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.hands import Hands
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
+from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
+from hmcs_console.seeing.presence import MOST_TOKENS, Presence
 from hmcs_console.seeing.seen import Picture, Seen
 from hmcs_console.serving.gateway import Gateway
 from hmcs_console.serving.page import Page
@@ -71,7 +72,8 @@ class Console(Service):
         self._labels = bus.publisher(Label, bus.keys.label)
         self._asking = Asking(bus)
         self._stopping = Stopping(bus)
-        self._swapping = Swapping(self._seen, self._request, settings.compare_s)
+        self._requesting = Requesting(bus, self._seen, self._asking)
+        self._swapping = Swapping(self._seen, self._requesting.request, settings.compare_s)
         self.recordings = Recordings(
             self._asking,
             bus.keys,
@@ -97,7 +99,7 @@ class Console(Service):
             self._asking.close()
             self._stopping.close()
             raise
-        self._hands = Hands(self.page, bus, settings.lease_s, log, self._stop_robots)
+        self._hands = Hands(self.page, bus, settings.lease_s, log, self._stop_everybody)
         self._painter: Painter[Picture] = Painter(self._view.draw, settings.rate_hz, log)
 
     def start(self) -> None:
@@ -105,7 +107,7 @@ class Console(Service):
         bus, keys, seen = self.bus, self.bus.keys, self._seen
         Listening(bus, seen, self.log, self._on_mark)
         bus.subscribe(TrainingProgress, keys.training, self._on_training)
-        bus.watch(keys.presence(ANY, ANY), self._on_presence)
+        Presence(bus, seen, self.log, self._on_process)
         bus.every(TAKE_EVERY_S, self._take)
         bus.every(1 / HANDLE_HZ, self._hands.tell_handle)
         bus.every(1 / self.settings.rate_hz, self._show)
@@ -205,9 +207,11 @@ class Console(Service):
         self._asking.take()
         self._stopping.take()
 
-    def _stop_robots(self) -> None:
-        robots = [member for member in self._seen.members if member.service == "robot"]
-        self._stopping.stop(robots, self._tell)
+    def _stop_everybody(self) -> None:
+        members = self._seen.members
+        robots = [member for member in members if member.service == "robot"]
+        crowded = len(members) >= MOST_TOKENS
+        self._stopping.stop_everybody(robots, self._tell, crowded=crowded)
 
     def _show(self) -> None:
         now_s = time.monotonic()
@@ -223,16 +227,7 @@ class Console(Service):
             # A new recording begins with nothing marked.
             self._seen.marking = self._seen.marking._replace(now="")
         self._tell(f"asking {question.service} to {question.verb} …")
-        self._request(question, self._tell, self._tell)
-
-    def _request(
-        self, question: Question, done: Callable[[str], None], failed: Callable[[str], None]
-    ) -> None:
-        member = first_of(question.service, self._seen.members)
-        if member is None:
-            failed(f"no {question.service} is there to {question.verb}: start one")
-        else:
-            self._asking.request(member, question.verb, question.body, done, failed)
+        self._requesting.request(question, self._tell, self._tell)
 
     def _label(self, state: str) -> None:
         self._say(wishes.label(state, self._seen.clock, self._seen.step))
@@ -255,15 +250,7 @@ class Console(Service):
     def _on_training(self, received: Received[TrainingProgress]) -> None:
         self._seen.training = received.body
 
-    def _on_presence(self, key: str, alive: bool) -> None:
-        member = self.bus.keys.member_of(key)
-        if member == (self.name, self.bus.source.instance):
-            return
-        if not alive:
-            self._seen.members.discard(member)
-            self._seen.health.pop(member, None)
-            return
-        self._seen.members.add(member)
+    def _on_process(self, member: Member) -> None:
         if member.service == "robot":
             looks = self.bus.keys.rpc(member.service, member.instance, "looks")
             self._asking.ask(looks, Ask(), RobotLooks, self._on_looks, timeout_s=5.0)

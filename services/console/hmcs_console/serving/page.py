@@ -39,8 +39,10 @@ from hmcs_console.operating.rules import (
     rule_of,
 )
 from hmcs_console.serving.inbox import Inbox, Press, Taken
+from hmcs_console.serving.writing import notify
 
 _PULSE_S = 0.05
+_NOTICE_S = 4.0
 _PEDAL_HZ = 10.0
 _HANDLE = "/handle"
 
@@ -129,7 +131,7 @@ class Page:
         """Tell one viewer something."""
         viewer = self.server.get_clients().get(client)
         if viewer is not None:
-            viewer.add_notification("Operating", text, auto_close_seconds=4.0, color="orange")
+            notify(viewer, text, seconds=_NOTICE_S)
 
     def close(self) -> None:
         """Send everybody away."""
