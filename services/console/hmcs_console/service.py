@@ -26,7 +26,7 @@ from hmcs.fixtures.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped
-from hmcs_console.operating.hands import Hands
+from hmcs_console.operating.hands import FLOOD, Hands
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
 from hmcs_console.requesting import Requesting
@@ -35,7 +35,7 @@ from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
 from hmcs_console.seeing.presence import MOST_TOKENS, Presence
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.gateway import Gateway
+from hmcs_console.serving.gateway import Gateway, Served, encryption
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
@@ -89,10 +89,9 @@ class Console(Service):
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
-        token = settings.token.get_secret_value() if settings.token is not None else None
         try:
             self._gateway = Gateway(
-                settings.host, settings.port, self.page.server.get_port(), token, log
+                served(settings), self.page.server.get_port(), log, self._count_refused
             )
         except BaseException:
             self.page.close()
@@ -130,7 +129,8 @@ class Console(Service):
     def url(self) -> str:
         """Where the page is served; a token is not in it."""
         host = "127.0.0.1" if self.settings.host in ("0.0.0.0", "::") else self.settings.host
-        return f"http://{f'[{host}]' if ':' in host else host}:{self._gateway.port}"
+        scheme = "http" if self.settings.page_certificate is None else "https"
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self._gateway.port}"
 
     def health(self) -> tuple[bool, str]:
         """Healthy unless drawing fails."""
@@ -245,6 +245,9 @@ class Console(Service):
     def _tell(self, answer: str) -> None:
         self._seen.answer = answer
 
+    def _count_refused(self, reason: str) -> None:
+        self.bus.counters.count_refused(FLOOD, reason)
+
     # --- listening --------------------------------------------------------------------------------
 
     def _on_training(self, received: Received[TrainingProgress]) -> None:
@@ -271,6 +274,18 @@ class Console(Service):
         }
         there = self._seen.members
         self._seen.health = {member: health for member, health in told.items() if member in there}
+
+
+def served(settings: ConsoleSettings) -> Served:
+    """Return where and how the page is served.
+
+    Raises UserError for a certificate or a key that cannot be used.
+    """
+    encrypted = None
+    if settings.page_certificate is not None and settings.page_key is not None:
+        encrypted = encryption(settings.page_certificate, settings.page_key)
+    token = settings.token.get_secret_value() if settings.token is not None else None
+    return Served(settings.host, settings.port, token, settings.page_names, encrypted)
 
 
 def _cued(task: Task) -> bool:

@@ -39,7 +39,7 @@ class View:
         log: logging.Logger,
     ) -> None:
         start_m = _HANDLE_AT_M if task is None else task.robot.tool_start_m
-        self.page = Page(np.array(start_m), lease_s)
+        self.page = Page(np.array(start_m), lease_s, log)
         server = self.page.server
         states = () if task is None else tuple(state.name for state in task.states)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
