@@ -22,6 +22,7 @@ MOST_SOURCES = 1024
 FREE_TRIES = 3
 """Wrong tokens of one address that cost no time."""
 LONGEST_WAIT_S = 300.0
+_MOST_DOUBLED = 10
 _FORGIVEN_S = 3600.0
 _SITE_BITS = 64
 """Of an IPv6 address; whoever has one of a network has all of it."""
@@ -72,7 +73,8 @@ class Tries:
         wrong = 1
         if before is not None and now_s - before.at_s < _FORGIVEN_S:
             wrong += before.wrong
-        wait_s = 0.0 if wrong < FREE_TRIES else min(2.0 ** (wrong - FREE_TRIES), LONGEST_WAIT_S)
+        doubled = min(wrong - FREE_TRIES, _MOST_DOUBLED)
+        wait_s = 0.0 if doubled < 0 else min(2.0**doubled, LONGEST_WAIT_S)
         if len(self._of) >= MOST_SOURCES:
             self._of.popitem(last=False)
         self._of[source] = _Tries(wrong, now_s, now_s + wait_s)
