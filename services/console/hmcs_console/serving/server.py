@@ -12,6 +12,7 @@ from typing import Any
 import viser
 
 from hmcs.bus.logs import Seldom
+from hmcs.shown import plain
 
 _LIBRARY_LOG = "websockets.server"
 
@@ -60,7 +61,7 @@ class _Told(logging.Handler):
 
     def _tell(self, what: str, error: BaseException | None) -> None:
         reason = what if error is None else f"{what}: {type(error).__name__}: {error}"
-        self._seldom.warning("library", "the page's server failed", reason=reason)
+        self._seldom.warning("library", "the page's server failed", reason=plain(reason))
 
 
 @contextlib.contextmanager
