@@ -20,8 +20,8 @@ from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.robot_model import joints_of, load_robot, written
 from hmcs_console.seeing.models import Models, guide_of, load_models, task_of
 from hmcs_console.seeing.seen import FORGOTTEN_S, Seen
-from hmcs_console.serving.page import Server
 from hmcs_console.serving.painter import Painter
+from hmcs_console.serving.server import Server
 
 LOG = logging.getLogger("test")
 URDF = """<robot name="arm"><link name="base"/><link name="upper"><visual><geometry>
@@ -169,7 +169,7 @@ def poses(robot: DrawnRobot) -> list[tuple[list[float], list[float]]]:
 
 
 def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
-    server = Server()
+    server = Server(LOG)
     quick, exact = DrawnRobot(server, moving(), "/quick"), DrawnRobot(server, moving(), "/exact")
     for joints in (
         {"turn": 0.7, "slide": -0.3, "wheel": 2.5},
@@ -185,7 +185,7 @@ def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
 
 
 def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None:
-    server = Server()
+    server = Server(LOG)
     robot = DrawnRobot(server, moving(), "/robot")
     robot.move({"turn": 0.5, "wheel": 1.0})
     before = poses(robot)
