@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -81,6 +80,6 @@ class View:
         if picture.training is not self._training:
             self._training = told = picture.training
             if told is not None and told.stage == "done" and told.path:
-                self._models.look_in(Path(told.path))
+                self._models.look_in(told.path)
         belief = picture.belief
         return self._models.find(picture.active, "" if belief is None else belief.model_hash)

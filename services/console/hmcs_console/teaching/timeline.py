@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -103,6 +103,11 @@ class Timeline:
         if self._state.chosen:
             self._editing.label(self._state.chosen)
 
+    def _choose(self, chosen: Sequence[float]) -> None:
+        # A page may say anything.
+        if len(chosen) == 2 and np.all(np.isfinite(chosen)):
+            self._editing.choose(min(chosen), max(chosen))
+
     def _make_slider(self, take: Take) -> None:
         """Its ends cannot be moved while it is there, where pages hold it."""
         if self._slider is not None:
@@ -116,7 +121,7 @@ class Timeline:
                 initial_value=take.chosen_s,
                 order=5.0,
             )
-        on_change(self._slider, lambda chosen: self._editing.choose(*sorted(chosen)))
+        on_change(self._slider, self._choose)
 
     def _draw_bands(self, take: Take, named: tuple[str, ...], states: tuple[str, ...]) -> None:
         data = bands(take, named)
