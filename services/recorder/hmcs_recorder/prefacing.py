@@ -1,5 +1,4 @@
-"""What is kept with a recording besides its messages: who is there, their settings and models, and
-how their robots look."""
+"""What is kept with a recording besides its messages: who is there, their settings and models."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from hmcs.bus.keys import ANY
-from hmcs.bus.messages import Ask, Description, Message, RobotLooks, SettingsReport
+from hmcs.bus.messages import Ask, Description, Message, SettingsReport
 from hmcs.bus.session import Answer, Bus, StoppedError
 from hmcs.recordings.parts import Preface, as_fields
 from hmcs.recordings.reading import LARGEST_ATTACHMENT_BYTES
@@ -20,19 +19,17 @@ from hmcs.recordings.reading import LARGEST_ATTACHMENT_BYTES
 M = TypeVar("M", bound=Message)
 
 ASK_S = 0.5
-JOINTS = "joints/"
-"""Metadata of this beginning and a robot's name say what its description calls its joints."""
 
 
 def preface_of(bus: Bus, models: Sequence[Path], log: logging.Logger) -> Preface:
     """Return who is there, what they are told to do, and the models they work with."""
     members = {
         f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
-        for answer in answers(bus, ANY, "describe", Description)
+        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "describe"), Ask(), Description)
     }
     settings = {
         f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body.settings
-        for answer in answers(bus, ANY, "settings", SettingsReport)
+        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "settings"), Ask(), SettingsReport)
     }
     metadata = {
         "hmcs": as_fields(
@@ -51,28 +48,18 @@ def preface_of(bus: Bus, models: Sequence[Path], log: logging.Logger) -> Preface
     return Preface(metadata, dict(_kept(models, log)))
 
 
-def looks_of(bus: Bus) -> dict[str, RobotLooks]:
-    """Return how the robots look that are there now and say so, by their names."""
-    return {answer.body.robot: answer.body for answer in answers(bus, "robot", "looks", RobotLooks)}
+def joined(*prefaces: Preface) -> Preface:
+    """Return all of several prefaces as one."""
+    return Preface(
+        {name: facts for each in prefaces for name, facts in each.metadata.items()},
+        {name: content for each in prefaces for name, content in each.attachments.items()},
+    )
 
 
-def looks_kept(looks: RobotLooks) -> Preface:
-    """Return what is kept of how a robot looks: its description, and its joints' names in order."""
-    urdf = f"{looks.robot}.urdf"
-    facts = {"joints": " ".join(looks.joints), "description": urdf}
-    return Preface({f"{JOINTS}{looks.robot}": facts}, {urdf: looks.urdf.encode()})
-
-
-def looks_unknown(robot: str) -> Preface:
-    """Return what is kept of a robot that does not say how it looks."""
-    facts = {"joints": "", "unknown": "it gives no answer to `looks`: its joints cannot be shown"}
-    return Preface({f"{JOINTS}{robot}": facts}, {})
-
-
-def answers(bus: Bus, service: str, verb: str, answer_type: type[M]) -> list[Answer[M]]:
+def ask_all(bus: Bus, key: str, question: Message, answer_type: type[M]) -> list[Answer[M]]:
     """Return what all that are there answer; nothing once this process is to end."""
     try:
-        return bus.ask(bus.keys.rpc(service, ANY, verb), Ask(), answer_type, ASK_S)
+        return bus.ask(key, question, answer_type, ASK_S)
     except StoppedError:
         return []
 

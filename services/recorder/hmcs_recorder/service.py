@@ -12,6 +12,7 @@ import logging
 import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from pathlib import Path
 
 from hmcs.bus.counters import Sequences
 from hmcs.bus.keys import ANY, check_name
@@ -25,23 +26,19 @@ from hmcs.bus.messages import (
     Outline,
     OutlineQuestion,
     Record,
-    RobotLooks,
     SetLabels,
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.wire import encode
+from hmcs.errors import UserError
+from hmcs.recordings.label_files import has_fingerprint
 from hmcs.recordings.labels import labels_beside
 from hmcs.recordings.parts import Limits, Preface, Recording
 from hmcs.recordings.plain import Fields, fields_of
 from hmcs_recorder.labeling import labels_set, outline_of
-from hmcs_recorder.prefacing import (
-    ASK_S,
-    looks_kept,
-    looks_of,
-    looks_unknown,
-    preface_of,
-)
+from hmcs_recorder.prefacing import ask_all, joined, preface_of
+from hmcs_recorder.robots import Robots
 from hmcs_recorder.settings import RecorderSettings
 from hmcs_recorder.wall_clock import WallClock
 
@@ -49,11 +46,9 @@ LOST = "recording"
 """What is counted as lost while nothing can be written."""
 MOST_PAST_STEPS = 10_000
 RETRY_S = 5.0
-"""After so long without room it is tried again, and robots are asked again how they look."""
+"""After so long without room it is tried again."""
 LARGEST_CLOCK_DIFFERENCE_NS = 5_000_000_000
 """A capture that seems longer ago was told by another machine's clock."""
-MOST_ASKED = 4
-"""So often a robot is asked how it looks: one that just starts may need some time."""
 
 
 class Recorder(Service):
@@ -74,10 +69,7 @@ class Recorder(Service):
         self._clock = WallClock(lambda: time.time_ns(), lambda: time.monotonic_ns())
         self._earliest_ns = 0
         """No message of this file is logged before: times within a file never fall."""
-        self._looks: dict[str, RobotLooks] = {}
-        self._asked_looks: dict[str, int] = {}
-        """How often robots were asked that did not answer."""
-        self._ask_looks_s = 0.0
+        self._robots = Robots(bus, log)
         self._reading = ThreadPoolExecutor(1, thread_name_prefix="reading")
 
     def start(self) -> None:
@@ -87,8 +79,7 @@ class Recorder(Service):
         self.bus.answer("set_labels", SetLabels, self._set_labels, aside=self._reading)
         self.bus.listen(self.bus.keys.everything, self._on_arrival)
         if self.settings.autostart:
-            self._wanted = f"{_now():%Y%m%d-%H%M%S}"
-            self._begin(self._wanted)
+            self._begin("")
         self.bus.every(self.settings.flush_s, self._on_flush)
 
     def health(self) -> tuple[bool, str]:
@@ -133,18 +124,12 @@ class Recorder(Service):
             )
         if asked.name:
             check_name("recording", asked.name)
-        name = asked.name or f"{_now():%Y%m%d-%H%M%S}"
-        begun = self._begin(name, next_free=not asked.name)
+        begun = self._begin(asked.name)
         if begun is None:
             # Who was refused does not expect it to begin later by itself.
-            reason, self._trouble = self._trouble, ""
+            self._wanted, reason, self._trouble = "", self._trouble, ""
             raise RequestRefusedError(reason)
-        self._wanted = name
-        said = f"recording to {begun.path}"
-        beside = labels_beside(begun.path)
-        if beside.exists():
-            said += f"; {beside.name} is there already, of an earlier recording: does not count"
-        return Done(detail=said)
+        return Done(detail=f"recording to {begun.path}{_of_labels_there(begun.path)}")
 
     # --- writing ----------------------------------------------------------------------------------
 
@@ -220,12 +205,12 @@ class Recorder(Service):
         if self._recording is not None:
             try:
                 self._mind_clock(self._recording)
-                self._mind_looks(self._recording)
+                self._robots.name_joints(self._recording, self._earliest_ns)
                 self._recording.flush()
             except OSError as error:
                 self._interrupted(error)
         elif self._wanted and time.monotonic() >= self._again_s:
-            self._begin(f"{self._wanted}-{_now():%H%M%S%f}")
+            self._open(f"{self._wanted}-{_now():%H%M%S%f}", next_free=True)
 
     def _interrupted(self, error: OSError) -> None:
         if self._recording is not None:
@@ -236,10 +221,19 @@ class Recorder(Service):
         self._trouble = str(error)
         self._again_s = time.monotonic() + RETRY_S
 
-    def _begin(self, name: str, *, next_free: bool = True) -> Recording | None:
+    def _begin(self, name: str) -> Recording | None:
+        """Begin a recording, named by date and time where it has no name; else as `_open`."""
+        self._wanted = name or f"{_now():%Y%m%d-%H%M%S}"
+        try:
+            return self._open(self._wanted, next_free=not name)
+        except UserError:
+            self._wanted = ""
+            raise
+
+    def _open(self, name: str, *, next_free: bool) -> Recording | None:
         """Begin a file; None where that cannot be, which is told in health.
 
-        Raises UserError where the name is taken, unless `next_free`.
+        Raises UserError where the name is taken, unless the next one that is free will do.
         """
         settings = self.settings
         limits = Limits(settings.part_mb, settings.part_s, settings.limit_mb, settings.free_mb)
@@ -250,14 +244,15 @@ class Recorder(Service):
             recording = Recording(
                 settings.folder, name, limits, self._preface, begun_ns, library, next_free=next_free
             )
-            for looks in self._looks.values():
-                recording.name_joints(looks.robot, looks.joints)
-            self._write_past_steps(recording, begun_ns)
         except OSError as error:
             self._interrupted(error)
             return None
         self._recording, self._trouble = recording, ""
-        self._asked_looks.clear()
+        try:
+            self._write_past_steps(recording, begun_ns)
+        except OSError as error:
+            self._interrupted(error)
+            return None
         self.log.info("recording", extra={"file": str(recording.path)})
         return recording
 
@@ -266,7 +261,7 @@ class Recorder(Service):
         bus = self.bus
         key = bus.keys.rpc("input_device", ANY, "last_steps")
         question = LastStepsQuestion(count=MOST_PAST_STEPS)
-        for answer in bus.ask(key, question, LastSteps, ASK_S)[:1]:
+        for answer in ask_all(bus, key, question, LastSteps)[:1]:
             for step, origin in zip(answer.body.steps, answer.body.origins, strict=False):
                 # A device numbers its steps as it numbers their messages.
                 envelope = Envelope(source=answer.envelope.source, seq=step.index, origin=origin)
@@ -289,38 +284,21 @@ class Recorder(Service):
     # --- what is kept with it ---------------------------------------------------------------------
 
     def _preface(self) -> Preface:
-        self._looks |= looks_of(self.bus)
-        preface = preface_of(self.bus, self.settings.models, self.log)
-        for looks in self._looks.values():
-            kept = looks_kept(looks)
-            preface = Preface(
-                {**preface.metadata, **kept.metadata}, {**preface.attachments, **kept.attachments}
-            )
-        return preface
+        self._robots.ask()
+        return joined(preface_of(self.bus, self.settings.models, self.log), *self._robots.kept())
 
-    def _mind_looks(self, recording: Recording) -> None:
-        """Ask robots how they look that came after the recording began, some times."""
-        nameless = {
-            robot for robot in recording.nameless if self._asked_looks.get(robot, 0) < MOST_ASKED
-        }
-        if not nameless or time.monotonic() < self._ask_looks_s:
-            return
-        self._ask_looks_s = time.monotonic() + RETRY_S
-        answered = looks_of(self.bus)
-        self._looks |= answered
-        for robot in nameless:
-            looks = answered.get(robot)
-            if looks is not None:
-                recording.add(looks_kept(looks), self._earliest_ns)
-                recording.name_joints(robot, looks.joints)
-                continue
-            self._asked_looks[robot] = self._asked_looks.get(robot, 0) + 1
-            if self._asked_looks[robot] == MOST_ASKED:
-                recording.add(looks_unknown(robot), self._earliest_ns)
-                self.log.warning(
-                    "a robot does not say how it looks: viewers cannot show its joints",
-                    extra={"robot": robot},
-                )
+
+def _of_labels_there(recording: Path) -> str:
+    """What to tell of labels beside a recording that only begins."""
+    beside = labels_beside(recording)
+    if not beside.exists():
+        return ""
+    if has_fingerprint(beside):
+        return f"; the labels in {beside.name} are of an earlier one and do not count for it"
+    return (
+        f"; the labels in {beside.name} do not say of which recording they are and will count for "
+        "it: move that file away if they are of an earlier one"
+    )
 
 
 def _now() -> datetime:

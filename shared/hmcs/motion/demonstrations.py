@@ -245,7 +245,7 @@ def _number(where: str, name: str, text: str) -> float:
     try:
         return number_in(text)
     except ValueError as error:
-        raise DemonstrationError(f"{where}: {name} is {text[:32]!r}, {error}") from None
+        raise DemonstrationError(f"{where}: {name} is {error}") from None
 
 
 def _is_numbers(fields: list[str]) -> bool:

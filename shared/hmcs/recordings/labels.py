@@ -9,50 +9,24 @@ another recording of the same name the labels do not count. A file without it is
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from hmcs.bus.messages import Label, Step
-from hmcs.plain_numbers import number_in, separator_in
-from hmcs.recordings.fingerprints import Fingerprint, fingerprint_in, fingerprint_of, is_of
-from hmcs.recordings.found import COMMENT, is_as_found, marked
+from hmcs.recordings.fingerprints import fingerprint_of, is_of
+from hmcs.recordings.found import is_as_found, marked
+from hmcs.recordings.label_files import MOST_LABELS, LabelFile, labels_text, read_labels
 from hmcs.recordings.reading import RecordingContent, RecordingError
-from hmcs.recordings.stretches import (
-    NS_PER_S,
-    Stretch,
-    ends_after,
-    misread_unit,
-    to_ns,
-    told,
-)
+from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, to_ns, told
 from hmcs.whole_files import written_whole
 
-HEADER = ["begin_s", "end_s", "state"]
 SUFFIX = ".labels.csv"
 How = Literal["said meanwhile", "set afterwards", "found"]
-LARGEST_BYTES = 8 * 1024 * 1024
-"""Of a file of labels; of a hundred thousand it has less."""
-MOST_LABELS = 100_000
-"""Of a recording: one for every third of a second of ten hours."""
 FAR_BEYOND_S = 1.0
 """Who wrote a label that ends later than the recording by more than this meant something else than
 a rounded number."""
-MOST_SECONDS = 1e19
-"""What is larger is no time, not even in nanoseconds since 1970."""
-_SHOWN = 80
-
-
-class _Written(NamedTuple):
-    """A file of labels."""
-
-    stretches: tuple[Stretch, ...]
-    lines: tuple[int, ...]
-    """Of each stretch in the file."""
-    fingerprint: Fingerprint | None
 
 
 def labels_beside(recording: Path) -> Path:
@@ -105,14 +79,6 @@ def label_notes(content: RecordingContent) -> tuple[str, ...]:
     )
 
 
-def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
-    """Return the labels in a file whose seconds count from `first_ns`.
-
-    Raises RecordingError, naming file and line, for a row that is none or overlaps another.
-    """
-    return _read(file, first_ns).stretches
-
-
 def write_labels(
     content: RecordingContent, stretches: Sequence[Stretch], *, found: bool = False
 ) -> Path | None:
@@ -123,15 +89,8 @@ def write_labels(
     written.
     """
     file = labels_beside(content.path)
-    rows = io.StringIO()
-    writer = csv.writer(rows, lineterminator="\n")
-    writer.writerow(HEADER)
-    for stretch in stretches:
-        times = (_seconds(at - content.first_ns) for at in (stretch.begin_ns, stretch.end_ns))
-        writer.writerow([*times, stretch.state])
     try:
-        rows.write(f"{COMMENT} of {fingerprint_of(content.path)}\n")
-        text = rows.getvalue()
+        text = labels_text(stretches, content.first_ns, fingerprint_of(content.path))
         aside = _moved_aside(content)
         with written_whole(file) as unfinished:
             unfinished.write_text(marked(text) if found else text, encoding="utf-8", newline="\n")
@@ -140,20 +99,12 @@ def write_labels(
     return aside
 
 
-def has_fingerprint(file: Path) -> bool:
-    """Return whether a file of labels says of which recording they are; False for none at all."""
-    try:
-        return _read(file, 0).fingerprint is not None
-    except RecordingError:
-        return False
-
-
-def _written_beside(content: RecordingContent) -> _Written | None:
+def _written_beside(content: RecordingContent) -> LabelFile | None:
     beside = labels_beside(content.path)
-    return _read(beside, content.first_ns) if beside.is_file() else None
+    return read_labels(beside, content.first_ns) if beside.is_file() else None
 
 
-def _is_of_another(content: RecordingContent, written: _Written) -> bool:
+def _is_of_another(content: RecordingContent, written: LabelFile) -> bool:
     try:
         return written.fingerprint is not None and not is_of(written.fingerprint, content.path)
     except OSError as error:
@@ -178,7 +129,7 @@ def _moved_aside(content: RecordingContent) -> Path | None:
     return aside
 
 
-def _check_times(content: RecordingContent, written: _Written) -> None:
+def _check_times(content: RecordingContent, written: LabelFile) -> None:
     """Raise RecordingError where labels were written in another unit, or are of no part of it."""
     file = labels_beside(content.path)
     unit = misread_unit(written.stretches, content.first_ns, content.last_ns)
@@ -197,89 +148,6 @@ def _check_times(content: RecordingContent, written: _Written) -> None:
                 f"{file}:{line}: label {told(stretch, content.first_ns)} is outside of the "
                 f"recording, which lasts {content.duration_s:.3f} s: label what is in it"
             )
-
-
-def _read(file: Path, first_ns: int) -> _Written:
-    rows = csv.reader(io.StringIO(_text(file), newline=""), strict=True)
-    stretches: list[Stretch] = []
-    lines: list[int] = []
-    fingerprint = None
-    try:
-        _check_header(file, next(rows, []))
-        for row in rows:
-            if row and row[0].startswith(COMMENT):
-                fingerprint = fingerprint_in(row[0]) or fingerprint
-            elif any(field.strip() for field in row):
-                where = f"{file}:{rows.line_num}"
-                stretches.append(_stretch(where, row, first_ns, stretches))
-                lines.append(rows.line_num)
-    except csv.Error as error:
-        raise RecordingError(
-            f"{file}:{rows.line_num}: not a CSV file: {error}: see that each quote is closed"
-        ) from error
-    return _Written(tuple(stretches), tuple(lines), fingerprint)
-
-
-def _text(file: Path) -> str:
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST_BYTES + 1)
-        if len(data) > LARGEST_BYTES:
-            raise RecordingError(
-                f"{file}: has more than {LARGEST_BYTES / 1e6:.0f} MB: expected a file of labels"
-            )
-        text = data.decode("utf-8-sig")
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise RecordingError(f"{file}:{line}: not UTF-8 text: save it as CSV in UTF-8") from error
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise RecordingError(f"{file}:{line}: binary data, expected a CSV file")
-    return text
-
-
-def _check_header(file: Path, header: Sequence[str]) -> None:
-    columns = [column.strip().lower() for column in header]
-    if columns == HEADER:
-        return
-    separated = separator_in(",".join(header))
-    hint = "" if separated is None else f", separated by commas instead of {separated}"
-    raise RecordingError(f"{file}:1: expected the header {','.join(HEADER)}{hint}")
-
-
-def _stretch(where: str, row: Sequence[str], first_ns: int, before: Sequence[Stretch]) -> Stretch:
-    fields = [field.strip() for field in row]
-    try:
-        begin_s, end_s = map(number_in, fields[:2])
-        state, *others = fields[2:]
-        if any(others):
-            raise ValueError("a field too many")
-    except ValueError:
-        shown = repr(fields)
-        raise RecordingError(
-            f"{where}: expected {','.join(HEADER)}, not "
-            f"{shown if len(shown) <= _SHOWN else shown[:_SHOWN] + '…'}"
-        ) from None
-    possible = begin_s < end_s and max(-begin_s, end_s) <= MOST_SECONDS
-    if not (possible and state and state.isprintable()):
-        raise RecordingError(f"{where}: expected begin_s below end_s, in seconds, and a state")
-    stretch = Stretch(first_ns + to_ns(begin_s), first_ns + to_ns(end_s), state)
-    if before and stretch.begin_ns < before[-1].end_ns:
-        raise RecordingError(
-            f"{where}: begins before the label above it ends: let each end where the next one "
-            "begins, in the order of time"
-        )
-    if len(before) == MOST_LABELS:
-        raise RecordingError(f"{where}: more than {MOST_LABELS} labels")
-    return stretch
-
-
-def _seconds(ns: int) -> str:
-    """Seconds with as many digits as they need."""
-    whole, rest = divmod(abs(ns), NS_PER_S)
-    return f"{'-' if ns < 0 else ''}{whole}.{rest:09}".rstrip("0").rstrip(".")
 
 
 def _said(content: RecordingContent) -> tuple[Stretch, ...]:

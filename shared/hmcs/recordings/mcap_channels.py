@@ -76,6 +76,8 @@ class Channels:
         self._told = told
         self._schemas: dict[int, str] = {0: ""}
         self._channels: dict[int, Channel] = {}
+        self.topics: dict[int, str] = {}
+        """Of channels whose schema was never described."""
 
     def __getitem__(self, number: int) -> Channel:
         return self._channels[number]
@@ -94,8 +96,12 @@ class Channels:
                     self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
                 channel = mcap.Channel.read(Strict(content))
-                name = self._schemas.get(channel.schema_id, "")
-                self.add(channel.id, Channel(channel.topic, name, channel.message_encoding))
+                if channel.schema_id in self._schemas:
+                    name = self._schemas[channel.schema_id]
+                    self.add(channel.id, Channel(channel.topic, name, channel.message_encoding))
+                elif channel.id not in self.topics:
+                    self._told.hold(channel.topic)
+                    self.topics[channel.id] = channel.topic
         except (McapError, struct.error, ValueError, OverflowError) as error:
             raise DamageError(f"a damaged description of a channel ({error})") from error
 

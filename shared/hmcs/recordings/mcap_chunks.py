@@ -59,10 +59,10 @@ def chunk_of(content: bytes) -> Chunk:
 
 
 def unpacked(chunk: Chunk) -> bytes:
-    """Return what is in a chunk.
+    """Return what is in a chunk; `check` tells whether it is what its head says.
 
     Raises DamageError where it is larger than LARGEST_CHUNK_BYTES, packed in a way unknown here, or
-    not what its head says.
+    cannot be unpacked.
     """
     size = chunk.unpacked_bytes
     if max(size, len(chunk.packed)) > LARGEST_CHUNK_BYTES:
@@ -85,9 +85,13 @@ def unpacked(chunk: Chunk) -> bytes:
                 raise DamageError(f"a chunk packed by {other[:16]!r}, which nobody here can unpack")
     except (zstandard.ZstdError, RuntimeError, EOFError, ValueError) as error:
         raise DamageError(f"a damaged chunk ({error})") from error
-    if len(data) != size or (chunk.crc and zlib.crc32(data) != chunk.crc):
-        raise DamageError("a damaged chunk (its checksum is another)")
     return data
+
+
+def check(chunk: Chunk, data: bytes) -> None:
+    """Raise DamageError where what was unpacked is not what the head of its chunk says."""
+    if len(data) != chunk.unpacked_bytes or (chunk.crc and zlib.crc32(data) != chunk.crc):
+        raise DamageError("a damaged chunk (its checksum is another)")
 
 
 def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:

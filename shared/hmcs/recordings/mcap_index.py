@@ -18,6 +18,7 @@ from hmcs.recordings.mcap_records import HEAD_BYTES, MAGIC
 
 LARGEST_INDEX_BYTES = 64 * 1024 * 1024
 """Of an index that is used. One of a million chunks is as large; a file is read without it too."""
+_DAMAGED = "its index is damaged, so that nobody can say what else is missing"
 _FOOTER = struct.Struct("<BQQQI")
 _PLACE: dict[int, int] = {
     Opcode.CHUNK_INDEX: 16,
@@ -40,7 +41,10 @@ class Index(NamedTuple):
 
 
 def index_of(stream: BinaryIO, size: int, told: Told) -> Index | None:
-    """Return the index of a file of `size` bytes; None where there is none that is whole."""
+    """Return the index of a file of `size` bytes; None where it has none.
+
+    Raises DamageError for one that cannot be used.
+    """
     tail = _FOOTER.size + len(MAGIC)
     if size < tail + len(MAGIC):
         return None
@@ -52,17 +56,19 @@ def index_of(stream: BinaryIO, size: int, told: Told) -> Index | None:
         _FOOTER.size - HEAD_BYTES,
         MAGIC,
     )
-    index_bytes = size - tail - at
-    if not known_end or at < len(MAGIC) or not 0 < index_bytes <= LARGEST_INDEX_BYTES:
+    if not known_end or at == 0:
         return None
+    index_bytes = size - tail - at
+    if at < len(MAGIC) or not 0 < index_bytes <= LARGEST_INDEX_BYTES:
+        raise DamageError(_DAMAGED)
     stream.seek(at)
     data = stream.read(index_bytes)
     if crc and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != crc:
-        return None
+        raise DamageError(_DAMAGED)
     try:
         return _index(at, data, told)
-    except (DamageError, McapError, struct.error, ValueError, OverflowError):
-        return None
+    except (DamageError, McapError, struct.error, ValueError, OverflowError) as error:
+        raise DamageError(_DAMAGED) from error
 
 
 def _index(at: int, data: bytes, told: Told) -> Index:

@@ -62,12 +62,18 @@ OF_INDEX = frozenset(
 """Kinds of records that stand behind the data only."""
 _KNOWN = frozenset({*_LAYOUTS, Opcode.MESSAGE})
 _COUNT_BYTES = {"I": 4, "Q": 8}
-_OF_DATA = bytes(_KNOWN - OF_INDEX - {Opcode.HEADER})
-_CANDIDATE = re.compile(
-    # An opcode of the data and a length below 4 GiB; matches may overlap.
-    rb"(?=[%s].{4}\0{4})." % re.escape(_OF_DATA),
-    re.DOTALL,
-)
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+_BESIDE_CHUNKS = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END)
+
+
+def _candidate(*opcodes: int) -> re.Pattern[bytes]:
+    """One of some opcodes and a length below 4 GiB; matches may overlap."""
+    return re.compile(rb"(?=[%s].{4}\0{4})." % re.escape(bytes(opcodes)), re.DOTALL)
+
+
+_CHUNKS = _candidate(Opcode.CHUNK)
+_IN_FILE_OF_CHUNKS = _candidate(Opcode.CHUNK, *_BESIDE_CHUNKS)
+_IN_FILE_WITHOUT = _candidate(*_IN_CHUNKS, *_BESIDE_CHUNKS)
 
 
 class Record(NamedTuple):
@@ -112,7 +118,10 @@ class RecordFile:
         self._indexed = index_at is not None
         self._end = size if index_at is None else index_at
         self._known = known
+        self._chunked: bool | None = None
+        """Whether the file has chunks; None until it is known."""
         self._tries = MOST_TRIES
+        self._search_from = len(MAGIC)
 
     def read(self, begin: int, end: int) -> bytes:
         """Return the bytes from `begin` up to `end`, fewer where the file ends before."""
@@ -124,26 +133,34 @@ class RecordFile:
 
         Ends after `DataEnd` or the first record of an index, or with a Cut.
         """
-        at = search_from = len(MAGIC)
+        at = self._search_from = len(MAGIC)
         while at < self._end:
             record = self._record_at(at)
             if record is not None and self._is_whole(record):
+                # Where nothing whole follows it, its length may be wrong as well, and what follows
+                # lie within it. Within chunks and attachments there are records of their own.
+                inside = record.opcode in (Opcode.CHUNK, Opcode.ATTACHMENT)
+                self._search_from = record.end if inside else at + 1
+                if record.opcode == Opcode.CHUNK:
+                    self._chunked = True
                 yield record
                 if record.opcode == Opcode.DATA_END or record.opcode in OF_INDEX:
                     return
-                # The length of a message cannot be checked: what follows it may lie within it.
-                search_from = at + 1 if record.opcode == Opcode.MESSAGE else record.end
                 at = record.end
                 continue
             cut = record is not None and not self._indexed and self._is_cut(record)
-            found = None if cut else self._next_whole(search_from)
+            found = None if cut else self._next_whole(self._search_from)
             if found is None:
                 yield Torn(at, self._end) if self._indexed else Cut(at)
                 return
             yield Torn(min(at, found), found)
-            at = search_from = found
+            at = self._search_from = found
         if not self._indexed:
             yield Cut(self._end)
+
+    def doubt(self, record: Record) -> None:
+        """Note that the record yielded last is damaged: what follows it may lie within it."""
+        self._search_from = record.at + 1
 
     def _record_at(self, at: int) -> Record | None:
         head = self.read(at, at + HEAD_BYTES)
@@ -166,11 +183,11 @@ class RecordFile:
         )
 
     def _is_cut(self, record: Record) -> bool:
-        """Whether the file ends within a record that is right as far as it goes."""
+        """Whether the file ends within a record whose parts would fill it, by all their counts."""
         return record.end > self._size and record.opcode in _LAYOUTS and self._fits(record)
 
     def _fits(self, record: Record) -> bool:
-        """Whether the parts of a record fill it, as far as they are there."""
+        """Whether the parts of a record fill it; not where one's count is not there."""
         if record.opcode == Opcode.MESSAGE:
             return record.end - record.content >= _LEAST_MESSAGE_BYTES
         at = record.content
@@ -178,7 +195,7 @@ class RecordFile:
             if isinstance(part, str):
                 count = self.read(at, at + _COUNT_BYTES[part])
                 if len(count) < _COUNT_BYTES[part]:
-                    return record.end > self._size
+                    return False
                 at += len(count) + int.from_bytes(count, "little")
             else:
                 at += part
@@ -187,21 +204,32 @@ class RecordFile:
         return at == record.end
 
     def _next_whole(self, begin: int) -> int | None:
-        """Where the next record begins after `begin`: found in the bytes, else by the index."""
-        by_index = self._next_known(begin)
-        end = self._end if by_index is None else by_index
+        """Where the next record begins after `begin`: found in the bytes, else by the index.
+
+        Messages are looked for only where the file has no chunks: those in a chunk that is damaged
+        could not be checked.
+        """
+        known = self._next_known(begin)
+        end = self._end if known is None else known
+        if self._chunked is None:
+            self._chunked = self._search(_CHUNKS, begin, self._end) is not None
+        wanted = _IN_FILE_OF_CHUNKS if self._chunked else _IN_FILE_WITHOUT
+        found = self._search(wanted, begin, end)
+        return known if found is None else found
+
+    def _search(self, wanted: re.Pattern[bytes], begin: int, end: int) -> int | None:
         for at in range(begin, end, _SEARCH_BYTES):
             # A match that begins in this block may end in the next one.
             block = self.read(at, at + _SEARCH_BYTES + HEAD_BYTES)
-            for match in _CANDIDATE.finditer(block, 0, _SEARCH_BYTES + HEAD_BYTES):
+            for match in wanted.finditer(block):
                 place = at + match.start()
                 if place >= min(end, at + _SEARCH_BYTES):
                     break
                 if not self._may_try():
-                    return by_index
+                    return None
                 if self._goes_on(place):
                     return place
-        return by_index
+        return None
 
     def _next_known(self, begin: int) -> int | None:
         for index in range(bisect_left(self._known, begin), len(self._known)):

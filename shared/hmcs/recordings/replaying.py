@@ -9,18 +9,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, cast, get_args
 
-import numpy as np
-
 from hmcs.bus.messages import Belief, Evidence, Step
 from hmcs.bus.wire import schema_of
 from hmcs.errors import UserError
-from hmcs.motion.steps import Step as MotionStep
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.layered import LayeredRecognizer, Layers, Precision, TaskRecognizer
+from hmcs.recognition.layered import Precision
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizer import Guarded, Recognition, Recognizer
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recordings.as_live import AsLive
 from hmcs.recordings.beliefs import Beliefs, Believed, Packed, Packer
 from hmcs.recordings.inspection import unread
 from hmcs.recordings.labels import label_notes, labels_of
@@ -114,7 +109,7 @@ def replayed(
             else:
                 missing += step.index - expected
             clock = envelope.source.boot
-            recognizer = _AsLive(model, step.index > 0, precision)
+            recognizer = AsLive(model, step.index > 0, precision)
         expected, last_ns = step.index + 1, logged.log_ns
         then = recorded.get((clock, step.index))
         recognition = recognizer.step(step_of(step), _missing(model, then))
@@ -190,45 +185,6 @@ def _strangers(
 def _state_of(label: Stretch) -> str:
     """The state a label tells, without the gesteme it may name besides."""
     return label.state.partition("/")[0]
-
-
-class _AsLive:
-    """A model's recognizer; of a layered one evidence can be missing as it was live."""
-
-    def __init__(self, model: Model, anywhere: bool, precision: Precision) -> None:
-        self._task: _LackingTask | None = None
-        if isinstance(model.knowledge, Layers):
-            layered = LayeredRecognizer(model, anywhere=anywhere, precision=precision)
-            layered.task = self._task = _LackingTask(model, anywhere=anywhere)
-            self._recognizer: Recognizer = Guarded(layered)
-        else:
-            self._recognizer = recognizer_of(model, anywhere=anywhere)
-
-    def step(self, step: MotionStep, missing: frozenset[int]) -> Recognition:
-        """Take the next step, without evidence of the gestemes `missing`."""
-        if self._task is not None:
-            self._task.missing = missing
-        return self._recognizer.step(step)
-
-
-class _LackingTask(TaskRecognizer):
-    """The task level, which evidence of some gestemes does not reach."""
-
-    missing: frozenset[int] = frozenset()
-
-    def step(self, evidence: StepEvidence) -> Recognition:
-        """Take the evidence for the next step but what is missing."""
-        if self.missing:
-            kept = ~np.isin(evidence.pair_gesteme, list(self.missing))
-            evidence = StepEvidence(
-                evidence.step,
-                tuple(g for g in evidence.gestemes if g not in self.missing),
-                evidence.pair_gesteme[kept],
-                evidence.pair_start[kept],
-                evidence.exit[kept],
-                evidence.log_ratio[kept],
-            )
-        return super().step(evidence)
 
 
 def _missing(model: Model, then: Packed | None) -> frozenset[int]:

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 
 from hmcs.recordings.gaps import Gap
 from hmcs.recordings.mcap_channels import Channel
-from hmcs.recordings.mcap_chunks import DamageError, Message, chunk_of, unpacked
+from hmcs.recordings.mcap_chunks import DamageError, Message, check, chunk_of, unpacked
 from hmcs.recordings.mcap_records import HEAD_BYTES, Record, RecordFile
 
 LARGEST_MESSAGE_BYTES = 4 * 1024 * 1024
@@ -131,9 +131,14 @@ def why_passed_over(channel: Channel, message: Message, data: bytes) -> str:
 
 
 def records_of(file: RecordFile, block: Block) -> bytes:
-    """Return the records in a block, unpacked; DamageError as `unpacked` raises it."""
+    """Return the records in a block, unpacked; DamageError as `unpacked` and `check` raise it."""
     data = file.read(block.at, block.end)
-    return unpacked(chunk_of(data[HEAD_BYTES:])) if data[:1] == bytes([Opcode.CHUNK]) else data
+    if data[:1] != bytes([Opcode.CHUNK]):
+        return data
+    chunk = chunk_of(data[HEAD_BYTES:])
+    records = unpacked(chunk)
+    check(chunk, records)
+    return records
 
 
 def attached_at(file: RecordFile, record: Record) -> Attached:

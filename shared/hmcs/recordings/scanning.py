@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections import Counter
 from typing import BinaryIO
@@ -13,6 +14,7 @@ from mcap.opcode import Opcode
 from hmcs.recordings.gaps import Gap, Gaps
 from hmcs.recordings.mcap_channels import (
     CHANNEL_TOLD,
+    HMCS,
     LARGEST_TOLD_BYTES,
     Channel,
     Channels,
@@ -24,12 +26,13 @@ from hmcs.recordings.mcap_chunks import (
     Chunk,
     DamageError,
     Message,
+    check,
     chunk_of,
     message_at,
     records_in,
     unpacked,
 )
-from hmcs.recordings.mcap_index import index_of
+from hmcs.recordings.mcap_index import Index, index_of
 from hmcs.recordings.mcap_records import OF_INDEX, Record, RecordFile, Torn
 from hmcs.recordings.scan import (
     LARGEST_MESSAGE_BYTES,
@@ -48,6 +51,8 @@ EXPANSION_SLACK_BYTES = 64 * 1024 * 1024
 """Besides, so that no small file is refused."""
 _HEAD_ROOM_BYTES = 128
 _LARGEST_LOOSE_BYTES = 1 << 20
+_SAYS_SCHEMA = re.compile(rb'\{"schema": ?"([a-z_]{1,64}/[0-9]{1,4})"')
+"""How messages of the contract begin in a recording."""
 _DAY_NS = 86_400_000_000_000
 
 
@@ -59,7 +64,9 @@ def scanned(stream: BinaryIO, size: int) -> Scan:
 class _Scanner:
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self._told = Told()
-        self._index = index = index_of(stream, size, self._told)
+        self._gaps = Gaps()
+        self._no_index = ""
+        self._index = index = self._index_of(stream, size)
         self._channels = Channels(self._told)
         self._said = Channels(self._told)
         """What metadata say of channels, in case their own descriptions are damaged."""
@@ -67,13 +74,19 @@ class _Scanner:
             stream, size, None if index is None else index.at, () if index is None else index.places
         )
         self._scan = Scan(size, whole=index is not None)
-        self._gaps = Gaps()
         self._seen: Counter[int] = Counter()
         """Messages of the contract by channel, those passed over as well."""
         self._left_bytes = size * MOST_EXPANSION + EXPANSION_SLACK_BYTES
         self._last_ns = 0
         self._undescribed = _Span()
         self._loose: Block | None = None
+
+    def _index_of(self, stream: BinaryIO, size: int) -> Index | None:
+        try:
+            return index_of(stream, size, self._told)
+        except DamageError as error:
+            self._no_index = str(error)
+            return None
 
     def scan(self) -> Scan:
         for record in self._file.records():
@@ -99,10 +112,12 @@ class _Scanner:
         gaps = list(self._gaps)
         unknown = self._undescribed
         if unknown.count:
-            why = f"{unknown.count} messages of channels whose description is damaged or missing"
+            why = f"{unknown.count} messages of channels that nothing describes"
             gaps.append(Gap(unknown.first_ns, unknown.last_ns, why))
         elif self._scan.lost and not gaps:
             gaps.append(Gap(None, None, "messages that its index counts"))
+        if self._no_index:
+            gaps.append(Gap(None, None, self._no_index))
         return gaps
 
     def _take(self, record: Record) -> None:
@@ -132,12 +147,21 @@ class _Scanner:
         try:
             if record.end > room:
                 raise DamageError(f"a chunk of more than {LARGEST_CHUNK_BYTES / 1e6:.0f} MB")
-            self._left_bytes -= chunk.unpacked_bytes
-            if self._left_bytes < 0:
-                raise DamageError(f"more than {MOST_EXPANSION} times what the file has, unpacked")
-            self._within_chunk(record, unpacked(chunk))
+            self._within_chunk(record, self._unpacked(chunk))
         except DamageError as error:
+            self._file.doubt(record)
             self._gaps.miss(str(error), *_times_of(chunk))
+
+    def _unpacked(self, chunk: Chunk) -> bytes:
+        size = chunk.unpacked_bytes
+        if size > self._left_bytes:
+            raise DamageError(f"more than {MOST_EXPANSION} times what the file has, unpacked")
+        # What cannot be unpacked may have been as long in the making as it says it is large.
+        self._left_bytes -= size
+        data = unpacked(chunk)
+        self._left_bytes += size - len(data)
+        check(chunk, data)
+        return data
 
     def _within_chunk(self, record: Record, data: bytes) -> None:
         span, types = _Span(), 0
@@ -180,7 +204,7 @@ class _Scanner:
 
     def _message(self, message: Message, data: bytes) -> int:
         """Count a message; return the bit of its type, 0 where it is passed over."""
-        channel = self._channel(message.channel)
+        channel = self._channel(message.channel) or self._guessed(message, data)
         if channel is None:
             self._undescribed.take(message.log_ns)
             return 0
@@ -213,6 +237,16 @@ class _Scanner:
             if channel is not None:
                 self._channels.add(number, channel)
         return channel
+
+    def _guessed(self, message: Message, data: bytes) -> Channel | None:
+        """What a channel must be whose description is damaged, by what its message says it is."""
+        said = _SAYS_SCHEMA.match(data, message.begin, message.end)
+        if said is None:
+            return None
+        topic = self._channels.topics.get(message.channel, f"unknown/{message.channel}")
+        guess = Channel(topic, f"{HMCS}{said[1].decode()}", "json")
+        self._channels.add(message.channel, guess)
+        return guess
 
     def _words(self, record: Record) -> None:
         if record.end - record.content > LARGEST_TOLD_BYTES:
