@@ -486,7 +486,8 @@ def replay(
     done by that: an open loop, in which hand and robot are where they were recorded and react to
     nothing. Both stand beside what was recorded.
 
-    --json: `steps` `compared` `same_bits` `agreement` `later_steps` of the beliefs; shares right by
+    --json: `steps`, those of them `degraded` (believed without all evidence live), the others
+    `compared`, `same_bits` `agreement` `later_steps` of their beliefs; shares right by
     the labels `replayed_right` `recorded_right`; `times_real` as fast as it happened; of the
     fixture, over its ticks with a recorded one, `fixture_ticks` `_compared`, mean |Δk|
     `_factor_apart`, shares `_factor_close` (within 0.02) `_same_state` `_guides_both`
