@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
+from itertools import islice
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
@@ -22,6 +23,9 @@ from hmcs.task.parts import (
 from hmcs.task.values import TWIST_AXES, Distribution, Name, Part
 
 Location = tuple[str | int, ...]
+
+_MOST_UNKNOWN = 50
+"""So many unknown names are told."""
 
 
 class Task(Part):
@@ -117,7 +121,8 @@ def contradictions(draft: Draft) -> list[Contradiction]:
     found += _narrow_volumes(draft)
     found += _blocked_axes(draft)
     if draft.complete:
-        strangers = list(_unknown_names(draft))
+        # Which name is nearest is looked for among all: that takes its time.
+        strangers = list(islice(_unknown_names(draft), _MOST_UNKNOWN))
         # A misspelled name hides a way; what can be reached is told once the names are right.
         found += strangers or _unreachable(draft)
     return found
