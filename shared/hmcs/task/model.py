@@ -145,15 +145,17 @@ def _unknown_names(draft: Draft) -> Iterator[Contradiction]:
     states = {state.name for _, state in draft.states}
     gestemes = {gesteme.name for _, gesteme in draft.gestemes}
     for index, state in draft.states:
+        before: set[str] = set()
         for place, name in enumerate(state.gestemes):
             if name not in gestemes:
                 yield Contradiction(
                     ("states", index, "gestemes", place), unknown("gesteme", name, gestemes)
                 )
-            if name in state.gestemes[:place]:
+            if name in before:
                 yield Contradiction(
                     ("states", index, "gestemes", place), f"{name!r} stands twice, expected once"
                 )
+            before.add(name)
         for name in state.next:
             if name not in states:
                 yield Contradiction(("states", index, "next", name), unknown("state", name, states))
