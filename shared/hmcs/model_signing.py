@@ -7,12 +7,13 @@ checksum tells damage; only a signature tells whose model it is. Needs the extra
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
-from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import read_model
+from hmcs.recognition.model_archive import MOST_BYTES
 from hmcs.whole_files import written_whole
 
 _INSTALL = "install the extra hmcs[signing]: it brings cryptography"
@@ -42,16 +43,14 @@ def sign_model(model: Path, private_key: Path) -> Path:
     return target
 
 
-def load_trusted_model(path: Path, public_key: Path | None) -> Model:
-    """Return the model in a file, signed with the key of `public_key` (PEM) where one is given.
+def signed_by(public_key: Path | None) -> Callable[[Path, bytes], None] | None:
+    """Return what `load_model` is to verify; None where no key (PEM) is required.
 
-    The very bytes that were checked are read. Raises SignatureError for a missing or wrong
-    signature, ModelFileError for a file that is no model.
+    It raises SignatureError for a missing or wrong signature.
     """
-    data = _read(path)
-    if public_key is not None:
-        _check(path, data, public_key)
-    return read_model(data, path)
+    if public_key is None:
+        return None
+    return lambda path, data: _check(path, data, public_key)
 
 
 def _check(path: Path, data: bytes, public_key: Path) -> None:
@@ -63,7 +62,7 @@ def _check(path: Path, data: bytes, public_key: Path) -> None:
     if not isinstance(key, ed25519.Ed25519PublicKey):
         raise SignatureError(f"{public_key}: is no Ed25519 key")
     signature = signature_path(path)
-    if not signature.is_file():
+    if not signature.exists():
         raise SignatureError(
             f"{path}: is not signed ({signature.name} is missing), and this cell loads signed "
             "models alone: `hmcs secure sign`"
@@ -80,9 +79,9 @@ def _check(path: Path, data: bytes, public_key: Path) -> None:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise SignatureError(f"{path}: {error.strerror}") from error
+        return read_bounded(path, MOST_BYTES)
+    except UnreadableFileError as error:
+        raise SignatureError(str(error)) from error
 
 
 def _library() -> tuple[Any, Any]:
@@ -92,5 +91,5 @@ def _library() -> tuple[Any, Any]:
     except ImportError as error:
         raise SignatureError(
             f"models are to be signed, but cryptography is missing: {_INSTALL}"
-        ) from error  # noqa: E501
+        ) from error
     return serialization, ed25519

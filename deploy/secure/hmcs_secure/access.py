@@ -21,8 +21,8 @@ OVERHEAD_BYTES = 1024
 """What Zenoh may add to a payload before it compares sizes."""
 
 
-def access_control(cell: str, holders: Iterable[Identity]) -> dict[str, Any]:
-    """Return the `access_control` of a router of a cell for the holders of its certificates."""
+def access_control(holders: Iterable[Identity]) -> dict[str, Any]:
+    """Return the `access_control` of a router for the holders of certificates."""
     rules: list[dict[str, Any]] = []
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
@@ -30,9 +30,7 @@ def access_control(cell: str, holders: Iterable[Identity]) -> dict[str, Any]:
         own = list(_rules_of(holder))
         rules += own
         subjects.append({"id": holder.common_name, "cert_common_names": [holder.common_name]})
-        policies.append(
-            {"rules": [rule["id"] for rule in own], "subjects": [holder.common_name]}
-        )
+        policies.append({"rules": [rule["id"] for rule in own], "subjects": [holder.common_name]})
     return {
         "enabled": True,
         "default_permission": "deny",

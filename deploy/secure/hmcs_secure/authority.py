@@ -1,8 +1,8 @@
 """A cell's own certificate authority, as files that only their owner can read.
 
-    FOLDER/ca.pem, ca.key               the authority
-    FOLDER/models.pub, models.key       what models are signed with
-    FOLDER/holders/ROLE[@INSTANCE].pem, .key
+FOLDER/ca.pem, ca.key               the authority
+FOLDER/models.pub, models.key       what models are signed with
+FOLDER/holders/ROLE[@INSTANCE].pem, .key
 """
 
 from __future__ import annotations
@@ -165,9 +165,7 @@ def issue(
     file = holders / f"{identity.file_name}.pem"
     _write_key(file.with_suffix(".key"), key)
     _write(file, certificate.public_bytes(serialization.Encoding.PEM))
-    return Holder(
-        identity, file, file.with_suffix(".key"), certificate.not_valid_after_utc, named
-    )
+    return Holder(identity, file, file.with_suffix(".key"), certificate.not_valid_after_utc, named)
 
 
 def holders_of(authority: Authority) -> list[Holder]:
@@ -290,8 +288,9 @@ def _write_key(path: Path, key: Key) -> None:
     )
     with written_whole(path) as unfinished:
         # Never readable by others, not for a moment.
-        with os.fdopen(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as f:
-            f.write(data)
+        descriptor = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        os.write(descriptor, data)
+        os.close(descriptor)
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Who holds a certificate: the common name says cell, role and, where it is bound to one, instance."""
+"""Who holds a certificate: its common name says cell, role and, where it is bound, instance."""
 
 from __future__ import annotations
 

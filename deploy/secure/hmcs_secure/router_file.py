@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from hmcs.bus.config import LINK_OPTIONS
+from hmcs.bus.config import LINK_OPTIONS, UNICAST_OPTIONS
 from hmcs.whole_files import written_whole
 from hmcs_secure.access import access_control, size_limits
 from hmcs_secure.authority import Authority, AuthorityError, Holder, holders_of
@@ -55,8 +55,11 @@ def router_configuration(
             "retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2},
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"link": {"tx": LINK_OPTIONS, "protocols": ["tls"], "tls": credentials}},
-        "access_control": access_control(authority.cell, [h.identity for h in holders]),
+        "transport": {
+            "unicast": UNICAST_OPTIONS,
+            "link": {"tx": LINK_OPTIONS, "protocols": ["tls"], "tls": credentials},
+        },
+        "access_control": access_control([h.identity for h in holders]),
         "low_pass_filter": size_limits(authority.cell),
     }
 

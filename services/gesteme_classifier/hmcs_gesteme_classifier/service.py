@@ -12,6 +12,7 @@ from hmcs.bus.presence import TOKEN, member_named, present
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
+from hmcs.model_signing import signed_by
 from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import evidence_message, step_of
@@ -32,7 +33,7 @@ class GestemeClassifier(Service):
 
     def __init__(self, settings: GestemeClassifierSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model)
+        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
         self._named = _named(settings.gestemes, self._model.gesteme_names, settings.model)
         self._evidence = bus.publisher(
             Evidence, bus.keys.evidence(self._model.name, bus.source.instance)

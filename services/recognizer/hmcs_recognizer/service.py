@@ -14,6 +14,7 @@ from hmcs.bus.messages import Done, LoadModel
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.verbs import LOAD_MODEL
+from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.recognizers import recognizer_of
@@ -36,7 +37,7 @@ class RecognizerService(Service):
         self._hosted: dict[str, Hosted] = {}
         self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
         if settings.model is not None:
-            model = load_model(settings.model)
+            model = load_model(settings.model, verify=signed_by(settings.model_key))
             self._hosted[model.name] = self._host(model)
 
     def start(self) -> None:
@@ -75,7 +76,7 @@ class RecognizerService(Service):
 
         Raises ModelFileError where it cannot be used, RequestRefusedError for one too many.
         """
-        model = load_model(Path(asked.path))
+        model = load_model(Path(asked.path), verify=signed_by(self.settings.model_key))
         known = self.bus.in_loop(lambda: self._hosted.get(model.name))
         if known is not None:
             fresh = recognizer_of(model, anywhere=True)

@@ -16,7 +16,7 @@ import msgpack
 import numpy as np
 
 from hmcs_robot.driver import Array
-from hmcs_robot.supervision import Order
+from hmcs_robot.supervision import Order, Stop
 
 LARGEST_BYTES = 65_536
 """Of a datagram: a snapshot with hundreds of contacts is smaller."""
@@ -68,7 +68,7 @@ class Snapshot(NamedTuple):
     nearest_obstacle: str
     nearest_distance_m: float | None
     contacts: tuple[str, ...]
-    stop: str
+    stop: Stop
     limited: tuple[str, ...]
     region_distance_m: float | None
     late_ticks: int

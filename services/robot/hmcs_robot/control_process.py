@@ -16,9 +16,8 @@ import socket
 import sys
 import time
 
-from hmcs.fixtures.tool_shape import tool_shape_of
-
 from hmcs.errors import UserError
+from hmcs.fixtures.tool_shape import tool_shape_of
 from hmcs.fixtures.workspace import regions_of
 from hmcs.task import Task, load_task
 from hmcs_robot.channel import Channel, Closed, pack_snapshot, requests

@@ -11,6 +11,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
+from hmcs.model_signing import signed_by
 from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import belief_message, step_of
@@ -29,7 +30,7 @@ class TaskHmm(Service):
 
     def __init__(self, settings: TaskHmmSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model)
+        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
         self._recognizer = TaskRecognizer(self._model)
         self._warming: LayeredRecognizer | None = None
         self._gathering = Gathering(

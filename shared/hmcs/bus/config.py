@@ -9,10 +9,11 @@ from __future__ import annotations
 import ipaddress
 import json
 import re
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol, Self
 
 import zenoh
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from hmcs.bus.keys import check_name
 
@@ -55,8 +56,19 @@ class BusSettings(BaseModel):
     open_to_network: bool = False
     """Let a direct process be reached from other hosts, too. There is no encryption and no
     password: everybody who reaches its port can move the robot."""
+    tls_ca: Path | None = None
+    """Certificate of the cell's authority (PEM): the router has to hold one of its certificates."""
+    tls_certificate: Path | None = None
+    """This process' own certificate (PEM), which the router asks for."""
+    tls_key: Path | None = None
+    """The private key of that certificate (PEM)."""
     connect_timeout_s: float | None = Field(default=None, gt=0)
     """How long to wait for a router; None waits for ever."""
+
+    @model_validator(mode="after")
+    def _tls_is_whole(self) -> Self:
+        check_tls(self)
+        return self
 
     @field_validator("router")
     @classmethod
@@ -76,6 +88,51 @@ def check_endpoint(endpoint: str) -> str:
             f"{endpoint!r} is no endpoint: use protocol/address:port, e.g. {DEFAULT_ROUTER}"
         )
     return endpoint
+
+
+class TlsSettings(Protocol):
+    """Settings of whatever opens a session."""
+
+    @property
+    def router(self) -> str: ...  # noqa: D102
+    @property
+    def direct(self) -> bool: ...  # noqa: D102
+    @property
+    def tls_ca(self) -> Path | None: ...  # noqa: D102
+    @property
+    def tls_certificate(self) -> Path | None: ...  # noqa: D102
+    @property
+    def tls_key(self) -> Path | None: ...  # noqa: D102
+
+
+def check_tls(settings: TlsSettings) -> None:
+    """Raise ValueError for settings of TLS that are not whole or contradict each other."""
+    files = {
+        "tls_ca": settings.tls_ca,
+        "tls_certificate": settings.tls_certificate,
+        "tls_key": settings.tls_key,
+    }
+    missing = [name for name, file in files.items() if file is None]
+    if len(missing) == len(files):
+        if settings.router.startswith("tls/"):
+            raise ValueError(f"{settings.router} wants tls_ca, tls_certificate and tls_key")
+        return
+    if missing:
+        raise ValueError(
+            f"{', '.join(missing)} missing: a closed cell needs all of {', '.join(files)}"
+        )
+    if not settings.router.startswith("tls/"):
+        raise ValueError(
+            f"router is {settings.router}, expected tls/HOST:PORT: certificates are given"
+        )
+    if settings.direct:
+        raise ValueError(
+            "direct: processes that talk past the router talk past its rules; leave it out in a "
+            "closed cell"
+        )
+    for name, file in files.items():
+        if file is not None and not file.is_file():
+            raise ValueError(f"{name}: no such file: {file}")
 
 
 def opens_to_network(endpoint: str) -> bool:
@@ -110,18 +167,32 @@ def client_config(settings: BusSettings) -> zenoh.Config:
         },
         # Who is there is the router's to say: a broadcast would find other people's cells.
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": settings.direct}},
-        "transport": {"unicast": {"open_timeout": OPENING_MS}, "link": {"tx": _LINK}},
+        "transport": {"unicast": {"open_timeout": OPENING_MS}, "link": {"tx": LINK_OPTIONS}},
     }
+    if settings.tls_ca is not None:
+        config["transport"]["link"] |= {
+            "protocols": ["tls"],
+            "tls": {
+                "root_ca_certificate": str(settings.tls_ca),
+                "connect_certificate": str(settings.tls_certificate),
+                "connect_private_key": str(settings.tls_key),
+                "enable_mtls": True,
+                "verify_name_on_connect": True,
+            },
+        }
     if settings.direct:
         where = _EVERYWHERE if settings.open_to_network else _LOOPBACK
         config["listen"] = {"endpoints": [where]}
     return zenoh.Config.from_json5(json.dumps(config))
 
 
-_LINK = {
+LINK_OPTIONS: dict[str, Any] = {
     "lease": LEASE_MS,
     "queue": {"congestion_control": {"drop": {"wait_before_drop": WAIT_BEFORE_DROP_US}}},
 }
+"""Of every link, of sessions and routers."""
+UNICAST_OPTIONS = {"accept_timeout": ACCEPTING_MS, "accept_pending": ACCEPTING_AT_ONCE}
+"""Of every router: connections that say nothing keep nobody out."""
 
 
 def router_config() -> zenoh.Config:
@@ -132,8 +203,8 @@ def router_config() -> zenoh.Config:
         # Without it opening waits half a second for other routers to be found.
         "scouting": {"delay": 0, "multicast": {"enabled": False}},
         "transport": {
-            "unicast": {"accept_timeout": ACCEPTING_MS, "accept_pending": ACCEPTING_AT_ONCE},
-            "link": {"tx": _LINK},
+            "unicast": UNICAST_OPTIONS,
+            "link": {"tx": LINK_OPTIONS},
         },
     }
     return zenoh.Config.from_json5(json.dumps(config))

@@ -10,6 +10,7 @@ import hashlib
 import io
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -99,8 +100,10 @@ def model_files(place: Path) -> list[Path]:
     return files
 
 
-def load_model(path: str | Path) -> Model:
+def load_model(path: str | Path, *, verify: Callable[[Path, bytes], None] | None = None) -> Model:
     """Read a model file; see `model_archive` for the bounds of what is read.
+
+    `verify` is called with the very bytes before they are decoded, and may refuse them.
 
     Raises ModelFileError when there is no such file, it is truncated or no model file, too large,
     of another format version, damaged (checksum), or holds numbers that are not finite, do not fit,
@@ -112,6 +115,8 @@ def load_model(path: str | Path) -> Model:
     except UnreadableFileError as error:
         what = error.what.replace("no such file", "no such model file")
         raise ModelFileError(f"{source}: {what}: make one with `hmcs train`") from error
+    if verify is not None:
+        verify(source, content)
     try:
         with Archive(content) as archive:
             fields = archive.manifest()
