@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recordings.labels import how_labeled, labels_beside, labels_of, write_labels
@@ -20,6 +21,7 @@ from hmcs.recordings.stretches import (
     relabeled,
     told,
 )
+from hmcs.shown import plain
 from hmcs.task import Task
 from hmcs.task.model import unknown
 
@@ -82,11 +84,11 @@ def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingConten
 
 
 def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console) -> None:
-    title = f"{content.path.name}: {content.duration_s:.1f} s"
+    title = f"{plain(content.path.name)}: {content.duration_s:.1f} s"
     if not labels:
-        console.print(f"{title}, no labels: set one by --set BEGIN-END=STATE")
+        console.print(Text(f"{title}, no labels: set one by --set BEGIN-END=STATE"))
         return
-    table = Table(title=title, title_justify="left")
+    table = Table(title=Text(title), title_justify="left")
     table.add_column("from, s", justify="right")
     table.add_column("to, s", justify="right")
     table.add_column("state")
@@ -94,5 +96,5 @@ def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console
     how = how_labeled(content)
     for label in labels:
         begin_s, end_s = ((at - content.first_ns) / NS_PER_S for at in label[:2])
-        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", label.state, how)
+        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", Text(plain(label.state)), how)
     console.print(table)

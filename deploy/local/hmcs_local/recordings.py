@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recordings.exporting import Format, export
@@ -14,6 +15,10 @@ from hmcs.recordings.inspection import Inspection, inspected
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.plain import BY_SCHEMA
 from hmcs.recordings.reading import RecordingContent, read
+from hmcs.shown import plain
+
+_LONGEST = 4000
+"""Characters of a line."""
 
 
 def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
@@ -21,15 +26,17 @@ def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
     content = read(file)
     inspection = inspected(content)
     if as_json:
-        console.print(json.dumps(_told(content, inspection)), soft_wrap=True, highlight=False)
+        told = json.dumps(_told(content, inspection))
+        console.print(told, soft_wrap=True, highlight=False, markup=False)
         return not inspection.problems
-    table = Table(title=f"{file.name}: {inspection.duration_s:.1f} s", title_justify="left")
+    title = Text(f"{plain(file.name)}: {inspection.duration_s:.1f} s")
+    table = Table(title=title, title_justify="left")
     for name in ("key", "message", "messages", "Hz", "lost", "longest gap, s"):
         table.add_column(name, justify="left" if name in ("key", "message") else "right")
     for channel in inspection.channels:
         table.add_row(
-            "/".join(channel.key.split("/")[3:]),
-            channel.schema,
+            Text(plain("/".join(channel.key.split("/")[3:]))),
+            Text(plain(channel.schema)),
             str(channel.messages),
             f"{channel.rate_hz:.1f}",
             str(channel.lost),
@@ -38,14 +45,14 @@ def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
     console.print(table)
     for name, facts in sorted(content.metadata.items()):
         shown = {key: value for key, value in facts.items() if key != "settings" and value}
-        console.print(f"{name}: " + ", ".join(f"{key} {value}" for key, value in shown.items()))
+        _say(console, f"{name}: " + ", ".join(f"{key} {value}" for key, value in shown.items()))
     labels = _labels(content)
     if labels:
-        console.print(f"labels: {', '.join(labels)}")
+        _say(console, f"labels: {', '.join(labels)}")
     if content.attachments:
-        console.print(f"kept with it: {', '.join(sorted(content.attachments))}")
+        _say(console, f"kept with it: {', '.join(sorted(content.attachments))}")
     for problem in inspection.problems:
-        console.print(f"missing: {problem}")
+        _say(console, f"missing: {problem}")
     return not inspection.problems
 
 
@@ -54,9 +61,14 @@ def export_recording(file: Path, folder: Path, form: Format, console: Console) -
     content = read(file)
     try:
         for written in export(content, folder, form):
-            console.print(str(written))
+            _say(console, str(written))
     except OSError as error:
         raise UserError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+
+
+def _say(console: Console, line: str) -> None:
+    """Print a line that quotes a recording, whose names may be anything."""
+    console.print(Text(plain(line, _LONGEST)))
 
 
 def _told(content: RecordingContent, inspection: Inspection) -> dict[str, object]:
