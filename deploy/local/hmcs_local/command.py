@@ -14,12 +14,15 @@ from rich.text import Text
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
+from hmcs.shown import plain
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
 
 if TYPE_CHECKING:
     from hmcs_local.asking import Replies
 
 USER_MISTAKE = 2
+_LONGEST_LINE = 4000
+"""Characters of an error message that are shown, a line."""
 
 app = typer.Typer(
     help="HMCS: recognizes what an operator's hand is about to do, and lends it a ruler.",
@@ -637,7 +640,9 @@ def main() -> None:
     try:
         app()
     except UserError as error:
-        sys.stderr.write(f"hmcs: {error}\n")
+        # It may quote what a process or a file says.
+        lines = (plain(line, _LONGEST_LINE) for line in str(error).split("\n"))
+        sys.stderr.write("hmcs: " + "\n".join(lines) + "\n")
         sys.exit(USER_MISTAKE)
 
 
