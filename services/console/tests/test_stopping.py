@@ -13,7 +13,8 @@ from hmcs.bus.keys import Member
 from hmcs.bus.messages import Ask, Done
 from hmcs.bus.session import RequestRefusedError
 from hmcs_console.operating.handles import Grabbed
-from hmcs_console.operating.stopping import said
+from hmcs_console.operating.stopping import MOST_APART, said
+from hmcs_console.seeing.presence import MOST_TOKENS
 
 MakeCell = Callable[..., Any]
 MakeProcess = Callable[..., Any]
@@ -85,6 +86,75 @@ def test_a_robot_that_gives_no_answer_may_still_move_which_is_told_and_holds_nob
         "what came of it",
     )
     ending.set()
+
+
+def test_every_robot_is_asked_at_once_however_many_do_not_answer(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    ending = threading.Event()
+    asked: list[float] = []
+
+    def hangs(_: Ask) -> Done:
+        asked.append(time.monotonic())
+        ending.wait(20.0)
+        return Done(detail="late")
+
+    names = [f"hung-{number}" for number in range(12)]
+    for name in names:
+        robot(make_process, cell, name, hangs)
+    robot(make_process, cell, "well", stands)
+    seen = cell.service._seen
+    cell.until(lambda: len(seen.members) == 13, "all of them")
+    cell.service.stop()
+    cell.until(lambda: "robot well stands" in cell.service.answer, "the one that answers")
+    # None of those that hang has given up yet.
+    assert all(f"robot {name} is asked to stand" in cell.service.answer for name in names)
+    cell.until(lambda: len(asked) == 12, "each to have been asked")
+    cell.until(lambda: cell.service.answer.count("gave no answer") == 12, "what came of it")
+    assert all(f"robot {name} **may still move**" in cell.service.answer for name in names)
+    ending.set()
+
+
+def ghosts(cell: Any, count: int, service: str = "robot") -> None:
+    """Show processes that are not there, before all others by name."""
+    for number in range(count):
+        cell.other.announce(cell.other.keys.presence(service, f"a-ghost-{number}"))
+
+
+def test_a_robot_among_more_of_them_than_can_be_asked_apart_is_asked(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    ghosts(cell, 2 * MOST_APART)
+    robot(make_process, cell, "well", stands)
+    cell.until(lambda: len(cell.service._seen.members) == 2 * MOST_APART + 1, "all of them")
+    cell.service.stop()
+    cell.until(lambda: "robot well stands" in cell.service.answer, "the one that answers")
+    cell.until(lambda: "is asked to stand" not in cell.service.answer, "what came of the others")
+    assert cell.service.answer.count("**may still move**") == 2 * MOST_APART
+
+
+def test_a_robot_that_is_not_seen_for_ghosts_is_asked_all_the_same(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    ghosts(cell, MOST_TOKENS, "x")
+    cell.until(lambda: len(cell.service._seen.members) == MOST_TOKENS, "ghosts")
+    asked: list[bool] = []
+
+    def stop(_: Ask) -> Done:
+        asked.append(True)
+        return Done(detail="stands")
+
+    robot(make_process, cell, "well", stop)
+
+    def stopped() -> bool:
+        cell.service.stop()
+        cell.wait(0.2)
+        return bool(asked)
+
+    cell.until(stopped, "the robot to be asked")
 
 
 def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:
