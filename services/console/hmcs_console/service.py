@@ -33,7 +33,7 @@ from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
-from hmcs_console.seeing.presence import MOST_TOKENS, Presence
+from hmcs_console.seeing.presence import Presence
 from hmcs_console.seeing.seen import Picture, Seen
 from hmcs_console.serving.gateway import Gateway, Served, encryption
 from hmcs_console.serving.page import Page
@@ -208,10 +208,8 @@ class Console(Service):
         self._stopping.take()
 
     def _stop_everybody(self) -> None:
-        members = self._seen.members
-        robots = [member for member in members if member.service == "robot"]
-        crowded = len(members) >= MOST_TOKENS
-        self._stopping.stop_everybody(robots, self._tell, crowded=crowded)
+        robots = [member for member in self._seen.members if member.service == "robot"]
+        self._stopping.stop_everybody(robots, self._tell)
 
     def _show(self) -> None:
         now_s = time.monotonic()

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from hmcs.bus.keys import Member
-from hmcs.bus.messages import Ask, Done
+from hmcs.bus.messages import Ask, Done, StopRequest
 from hmcs.bus.session import RequestRefusedError
 from hmcs_console.operating.handles import Grabbed
-from hmcs_console.operating.stopping import MOST_APART, said
-from hmcs_console.seeing.presence import MOST_TOKENS
+from hmcs_console.operating.stopping import MOST_ASKED, said
 
 MakeCell = Callable[..., Any]
 MakeProcess = Callable[..., Any]
@@ -116,45 +115,21 @@ def test_every_robot_is_asked_at_once_however_many_do_not_answer(
     ending.set()
 
 
-def ghosts(cell: Any, count: int, service: str = "robot") -> None:
-    """Show processes that are not there, before all others by name."""
-    for number in range(count):
-        cell.other.announce(cell.other.keys.presence(service, f"a-ghost-{number}"))
-
-
-def test_a_robot_among_more_of_them_than_can_be_asked_apart_is_asked(
-    make_cell: MakeCell, make_process: MakeProcess
-) -> None:
+def test_whoever_hears_it_is_told_to_stand_seen_or_not(make_cell: MakeCell) -> None:
     cell = make_cell()
-    ghosts(cell, 2 * MOST_APART)
-    robot(make_process, cell, "well", stands)
-    cell.until(lambda: len(cell.service._seen.members) == 2 * MOST_APART + 1, "all of them")
+    for number in range(2 * MOST_ASKED):
+        cell.other.announce(cell.other.keys.presence("robot", f"a-ghost-{number}"))
+    heard: list[StopRequest] = []
+    keys = cell.other.keys
+    cell.other.subscribe(StopRequest, keys.stop_request, lambda got: heard.append(got.body))
+    cell.until(lambda: cell.service._stopping._requests.matching, "the console")
+    cell.until(lambda: len(cell.service._seen.members) == 2 * MOST_ASKED, "ghosts")
     cell.service.stop()
-    cell.until(lambda: "robot well stands" in cell.service.answer, "the one that answers")
-    cell.until(lambda: "is asked to stand" not in cell.service.answer, "what came of the others")
-    assert cell.service.answer.count("**may still move**") == 2 * MOST_APART
-
-
-def test_a_robot_that_is_not_seen_for_ghosts_is_asked_all_the_same(
-    make_cell: MakeCell, make_process: MakeProcess
-) -> None:
-    cell = make_cell()
-    ghosts(cell, MOST_TOKENS, "x")
-    cell.until(lambda: len(cell.service._seen.members) == MOST_TOKENS, "ghosts")
-    asked: list[bool] = []
-
-    def stop(_: Ask) -> Done:
-        asked.append(True)
-        return Done(detail="stands")
-
-    robot(make_process, cell, "well", stop)
-
-    def stopped() -> bool:
-        cell.service.stop()
-        cell.wait(0.2)
-        return bool(asked)
-
-    cell.until(stopped, "the robot to be asked")
+    cell.until(lambda: heard, "the message")
+    assert heard[0].reason == "Stop on the page of console x"
+    cell.until(lambda: "is asked to stand" not in cell.service.answer, "what came of it")
+    assert cell.service.answer.count("**may still move**") == 2 * MOST_ASKED
+    assert cell.service.answer.count("not asked") == MOST_ASKED
 
 
 def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:
