@@ -35,7 +35,8 @@ from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
 from hmcs_console.seeing.presence import Presence
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.gateway import Gateway, Served, encryption
+from hmcs_console.serving.encryption import encryption
+from hmcs_console.serving.gateway import Gateway, Served
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
@@ -90,9 +91,7 @@ class Console(Service):
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
         try:
-            self._gateway = Gateway(
-                served(settings), self.page.server.get_port(), log, self._count_refused
-            )
+            self._gateway = Gateway(served(settings), self.page.server, log, self._count_refused)
         except BaseException:
             self.page.close()
             self._asking.close()

@@ -25,13 +25,13 @@ from websockets.typing import Subprotocol
 
 from hmcs.bus.service import UserError
 from hmcs_console.serving.document import load_document
+from hmcs_console.serving.encryption import encryption
 from hmcs_console.serving.gateway import (
     MOST_CONNECTIONS,
     MOST_OF_AN_ADDRESS,
     MOST_PAGES,
     Gateway,
     Served,
-    encryption,
 )
 
 DEADLINE_S = 20.0
@@ -51,9 +51,18 @@ class Behind:
         self._server: Server = serve(
             self._converse, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None
         )
-        self.port: int = self._server.socket.getsockname()[1]
+        self.expected: list[int] = []
         self._thread = threading.Thread(target=self._server.serve_forever)
         self._thread.start()
+
+    def get_port(self) -> int:
+        return int(self._server.socket.getsockname()[1])
+
+    @contextlib.contextmanager
+    def expects(self, port: int) -> Iterator[None]:
+        self.expected.append(port)
+        yield
+        self.expected.remove(port)
 
     def close(self) -> None:
         self._server.shutdown()
@@ -61,6 +70,7 @@ class Behind:
 
     def _converse(self, connection: ServerConnection) -> None:
         assert connection.request is not None
+        assert connection.remote_address[1] in self.expected
         self.requests.append(str(connection.request.headers))
         connection.send(b"hello")
         with contextlib.suppress(ConnectionClosed):
@@ -78,7 +88,7 @@ class Door:
         handler.emit = self.lines.append  # type: ignore[method-assign]
         self.log.addHandler(handler)
         self.refused: list[str] = []
-        self.gateway = Gateway(served, behind.port, self.log, self.refused.append)
+        self.gateway = Gateway(served, behind, self.log, self.refused.append)
         self.port = self.gateway.port
 
     def page(self, **settings: Any) -> Any:
@@ -317,7 +327,7 @@ def test_who_brings_the_token_is_let_in_by_a_session(make_door: MakeDoor) -> Non
 def test_a_page_without_a_token_is_not_served_where_others_reach_it(behind: Behind) -> None:
     for host in ("0.0.0.0", ""):
         with pytest.raises(UserError, match="reached from other machines: give a token"):
-            Gateway(Served(host, 0), behind.port, logging.getLogger("x"), lambda _: None)
+            Gateway(Served(host, 0), behind, logging.getLogger("x"), lambda _: None)
 
 
 @pytest.fixture
