@@ -96,6 +96,7 @@ class Gateway:
         self._document = load_document()
         self._connections: Counter[str] = Counter()
         self._pages = 0
+        self._closing = False
         self._loop = asyncio.new_event_loop()
         self._loop.set_exception_handler(self._failed)
         self._thread = threading.Thread(target=self._loop.run_forever, name="gateway", daemon=True)
@@ -154,6 +155,7 @@ class Gateway:
         await self._server.start_serving()
 
     async def _shut(self) -> None:
+        self._closing = True
         self._server.close()
         tasks = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in tasks:
@@ -190,6 +192,8 @@ class Gateway:
             writer.transport.abort()
             self._turn_away("frames", "a browser is sent away", address, str(error))
         finally:
+            if self._closing:
+                writer.transport.abort()
             with suppress(*ended):
                 await _close(writer)
             self._connections[address] -= 1
