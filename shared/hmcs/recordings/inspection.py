@@ -77,7 +77,7 @@ def inspected(content: RecordingContent) -> Inspection:
 def damages(content: RecordingContent) -> Iterator[str]:
     """Yield what is missing in a recording since its file is damaged or was not ended."""
     for gap in content.gaps:
-        yield f"{_when(gap, content.first_ns)} something is missing: {gap.why}"
+        yield f"{_when(gap, content)} something is missing: {gap.why}"
     if content.gaps and content.lost:
         yield f"{content.lost} messages are missing in all, by the index of the file"
     if not content.whole:
@@ -155,9 +155,9 @@ def _lost(sequences: Sequences, message: Recorded, envelope: Envelope | None) ->
     return sequences.note(message.key, envelope.source.boot, envelope.seq) or 0
 
 
-def _when(gap: Gap, first_ns: int) -> str:
+def _when(gap: Gap, content: RecordingContent) -> str:
     begin, end = (
-        None if at is None else f"{(at - first_ns) / 1e9:.3f} s"
+        None if at is None or not content.messages else f"{(at - content.first_ns) / 1e9:.3f} s"
         for at in (gap.begin_ns, gap.end_ns)
     )
     if begin is None:

@@ -154,7 +154,7 @@ class _Scanner:
 
     def _unpacked(self, chunk: Chunk) -> bytes:
         size = chunk.unpacked_bytes
-        if size > self._left_bytes:
+        if LARGEST_CHUNK_BYTES >= size > self._left_bytes:
             raise DamageError(f"more than {MOST_EXPANSION} times what the file has, unpacked")
         # What cannot be unpacked may have been as long in the making as it says it is large.
         self._left_bytes -= size
