@@ -23,8 +23,10 @@ _MOST_MARKS = 3
 _WORD_JOINER = "\u2060"
 # Markdown makes a link of each of them in running text, even where it was written as entities.
 _LINK = re.compile(r"https?(?=://)|www(?=\.)|@", re.IGNORECASE)
-# Letters, digits and what begins, ends and divides nothing in markdown; a few only within a word.
-_ACTIVE = re.compile(r"(?<![^\W_])[-._]|[-._](?![^\W_])|(?!\w)[!-~](?<![-._,;:?'\"/%])|^ | $")
+# What begins, ends or divides something in markdown; a few characters only in certain places.
+_ACTIVE = re.compile(
+    r"[!#$&*<=>@[\\\]^`{|}~]|(?<![^\W_])_|_(?![^\W_])|[-+](?![^\W_])|^\d+[.)](?![^\W_])|^ | $"
+)
 
 
 def plain(text: str, longest: int = LONGEST) -> str:
@@ -56,7 +58,7 @@ def as_markdown(text: str, longest: int = LONGEST) -> str:
     No address in it becomes a link: an invisible joiner stands within.
     """
     unlinked = _LINK.sub(lambda found: found[0] + _WORD_JOINER, plain(text, longest))
-    return _ACTIVE.sub(lambda found: f"&#{ord(found[0])};", unlinked)
+    return _ACTIVE.sub(lambda found: f"{found[0][:-1]}&#{ord(found[0][-1])};", unlinked)
 
 
 class Markdown(str):

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from pydantic import BaseModel
 
-from hmcs.bus.arrays import ArraySpec
-from hmcs.bus.messages import Envelope, Message
+from hmcs.bus.arrays import LARGEST, ArraySpec
+from hmcs.bus.messages import Envelope, Message, Within
 
 Any_ = st.SearchStrategy[Any]
 
@@ -64,7 +64,7 @@ def _array(spec: ArraySpec) -> Any_:
 
     def arrays(dtype: str) -> Any_:
         elements = (
-            {"allow_nan": False, "allow_infinity": False} if np.dtype(dtype).kind == "f" else {}
+            {"min_value": -LARGEST, "max_value": LARGEST} if np.dtype(dtype).kind == "f" else {}
         )
         made = npst.arrays(dtype, shape, elements=elements)
         return made.map(_of_unit_length) if spec.unit else made
@@ -90,11 +90,15 @@ def _scalar(annotation: Any, metadata: list[Any]) -> Any_:
     high = bound(annotated_types.Le, "le")
     if annotation is bool:
         return st.booleans()
+    within = bound(Within, "largest")
     if annotation is int:
         low = above + 1 if above is not None else low
-        return st.integers(-(2**63) if low is None else low, 2**63 - 1 if high is None else high)
+        most = 2**63 - 1 if within is None else within
+        return st.integers(-most if low is None else low, most if high is None else high)
     if annotation is float:
-        return st.floats(low, high, allow_nan=False, allow_infinity=False)
+        most = None if within is None else within
+        low = -most if low is None and most is not None else low
+        return st.floats(low, most if high is None else high, allow_nan=False, allow_infinity=False)
     if annotation is str:
         shortest = bound(annotated_types.MinLen, "min_length") or 0
         return st.text(min_size=shortest, max_size=bound(annotated_types.MaxLen, "max_length") or 9)

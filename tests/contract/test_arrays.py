@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from pydantic import ValidationError
 
-from hmcs.bus.arrays import ArraySpec, to_wire
+from hmcs.bus.arrays import LARGEST, ArraySpec, to_wire
 from hmcs.bus.messages import Command, Evidence
 
 VECTOR = ArraySpec((3,))
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-LARGEST, LARGEST)
 
 
 @given(npst.arrays(np.float64, npst.array_shapes(max_dims=3, min_side=0), elements=finite))

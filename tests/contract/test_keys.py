@@ -7,7 +7,7 @@ import zenoh
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from hmcs.bus.keys import PREFIX, KeyNameError, Keys, Member, check_name
+from hmcs.bus.keys import PREFIX, KeyNameError, Keys, Member, Recognizer, check_name, recognizer_in
 
 names = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,12}", fullmatch=True)
 FORBIDDEN = "*$/?#@ \n\0"
@@ -21,7 +21,7 @@ def all_keys(keys: Keys, model: str, service: str, instance: str) -> list[str]:
         keys.fixture_state,
         keys.robot_state,
         keys.evidence(model, instance),
-        keys.belief(model),
+        keys.belief(model, instance),
         keys.member(model, service, instance),
         keys.presence(service, instance),
         keys.rpc(service, instance, "health"),
@@ -56,7 +56,7 @@ def test_cells_do_not_see_each_other_even_with_wildcards(one, other, service) ->
 def test_a_wildcard_sees_every_instance_and_nothing_else(cell, service, instance) -> None:
     keys = Keys(cell)
     assert zenoh.KeyExpr(keys.presence(service)).includes(keys.presence(service, instance))
-    assert zenoh.KeyExpr(keys.belief()).includes(keys.belief(service))
+    assert zenoh.KeyExpr(keys.belief()).includes(keys.belief(service, instance))
     assert not zenoh.KeyExpr(keys.presence()).intersects(keys.member("m", service, instance))
     assert not zenoh.KeyExpr(keys.belief()).intersects(keys.evidence(service, instance))
 
@@ -74,6 +74,21 @@ def test_presence_and_member_keys_name_their_process(cell, model, service, insta
     keys = Keys(cell)
     assert keys.member_of(keys.presence(service, instance)) == Member(service, instance)
     assert keys.member_of(keys.member(model, service, instance)) == Member(service, instance)
+
+
+@given(names, names, names)
+def test_keys_of_evidence_and_belief_name_model_and_instance(cell, model, instance) -> None:
+    keys = Keys(cell)
+    for key in (keys.evidence(model, instance), keys.belief(model, instance)):
+        assert recognizer_in(key) == Recognizer(model, instance)
+    without_instance = keys.belief(model, instance).removesuffix(f"/{instance}")
+    assert recognizer_in(without_instance) == Recognizer(model, "")
+    for key in (keys.motion, keys.member(model, "s", instance), "model/m/belief/i"):
+        with pytest.raises(KeyNameError, match="no belief or evidence key"):
+            recognizer_in(key)
+    assert keys.model_of(keys.member(model, "s", instance)) == model
+    with pytest.raises(KeyNameError, match="no member key"):
+        keys.model_of(keys.presence("s", instance))
 
 
 @given(names, names)
@@ -102,6 +117,7 @@ def test_names_that_are_none_are_refused_everywhere(bad) -> None:
         lambda: keys.evidence(bad),
         lambda: keys.evidence("m", bad),
         lambda: keys.belief(bad),
+        lambda: keys.belief("m", bad),
         lambda: keys.member("m", "s", bad),
         lambda: keys.presence(bad),
         lambda: keys.rpc("s", bad, "health"),

@@ -10,10 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hmcs.bus.bounds import BOUNDS, LARGEST_PUBLISHED_BYTES
 from hmcs.bus.examples import ENVELOPE, EXAMPLES
 from hmcs.bus.messages import (
     MESSAGES,
     Envelope,
+    Evidence,
     Message,
     Motion,
     RobotState,
@@ -212,3 +214,77 @@ def test_what_cannot_travel_is_a_type_error_of_the_sender() -> None:
     smuggled = MOTION.model_copy(update={"pedal": object()})
     with pytest.raises(TypeError, match="cannot travel"):
         encode(smuggled, ENVELOPE)
+
+
+# --- bounds ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("message_type", MESSAGES, ids=schema_of)
+def test_a_message_larger_than_its_bound_is_refused_undecoded(message_type) -> None:
+    bound = BOUNDS[message_type]
+    with pytest.raises(RefusedMessageError, match=f"expected at most {bound.size_bytes}"):
+        decode(bytes(bound.size_bytes + 1), message_type)
+
+
+@pytest.mark.parametrize("message_type", MESSAGES, ids=schema_of)
+def test_the_example_of_a_message_is_well_within_its_bound(message_type) -> None:
+    example = next(example for example in EXAMPLES if type(example) is message_type)
+    assert len(encode(example, ENVELOPE)) < BOUNDS[message_type].size_bytes / 2
+
+
+@pytest.mark.parametrize("message_type", MESSAGES, ids=schema_of)
+def test_every_bound_has_its_reason(message_type) -> None:
+    assert len(BOUNDS[message_type].reason.split()) >= 2
+    assert BOUNDS[message_type].reason.endswith(".")
+
+
+def crowded(schema: str) -> dict[str, Any]:
+    """Values that are small on the wire and large in memory or in time."""
+    return {
+        "many fields": {"schema": schema, **{str(k): k for k in range(2000)}},
+        "many elements": {"schema": schema, "x": [None] * 900_000},
+        "many lists": {"schema": schema, "x": [[]] * 900_000},
+        "many maps": {"schema": schema, "x": [{}] * 900_000},
+        "lists of lists": {"schema": schema, "x": [[None] * 3000] * 300},
+        "a huge name": {"schema": schema, "source": "x" * 900_000},
+        "maps of maps": {"schema": schema, "x": [{"a": {"b": {}}}] * 100_000},
+    }
+
+
+@pytest.mark.parametrize("kind", crowded(""))
+def test_the_elements_of_the_largest_published_message_are_counted_while_decoding(kind) -> None:
+    schema = schema_of(Evidence)
+    data = msgpack.packb(crowded(schema)[kind])
+    assert len(data) < LARGEST_PUBLISHED_BYTES
+    with pytest.raises(RefusedMessageError, match=r"exceeds max|more than|source"):
+        decode(data, Evidence)
+
+
+@pytest.mark.parametrize("depth", [100, 2000, 1_000_000])
+def test_nesting_without_end_is_refused(depth) -> None:
+    with pytest.raises(RefusedMessageError):
+        decode(b"\x81\xa1x" + b"\x91" * depth, Evidence)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("seq", 2**53 + 1),
+        ("seq", 2**64 - 1),
+        ("origin", {"boot": "b", "seq": 2**60, "captured_ns": 0}),
+    ],
+)
+def test_a_number_no_source_counts_to_is_refused(fields, name, value) -> None:
+    fields[name] = value
+    with pytest.raises(RefusedMessageError, match="beyond"):
+        decode(msgpack.packb(fields), Motion)
+
+
+@pytest.mark.parametrize("huge", [1e10, 1e154, 1.7e308, -1e300])
+@pytest.mark.parametrize("name", ["position", "velocity", "wrench"])
+def test_a_number_whose_square_would_be_lost_is_refused(fields, name, huge) -> None:
+    numbers = np.frombuffer(fields[name]["data"]).copy()
+    numbers[0] = huge
+    fields[name]["data"] = numbers.tobytes()
+    with pytest.raises(RefusedMessageError, match="beyond"):
+        decode(msgpack.packb(fields), Motion)

@@ -92,7 +92,9 @@ def performance(
             if not controller.active:
                 controller.activate(model.name)
             at_ns += BELIEF_AFTER_NS
-            yield logged(at_ns, KEYS.belief(model.name), belief, others["task_hmm"], origin)
+            yield logged(
+                at_ns, KEYS.belief(model.name, "task_hmm"), belief, others["task_hmm"], origin
+            )
         tool = tool + fixture.command_twist[:3] * (PERIOD_NS / 1e9)
         at_ns = begin_ns + count * PERIOD_NS + 2 * BELIEF_AFTER_NS
         state = _robot_state(tool, fixture.command_twist)

@@ -1,16 +1,64 @@
-"""The model files a fixture controller has loaded, by the name of their recognizer."""
+"""The models a fixture controller has loaded, by the name of their recognizer."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from hmcs.bus.service import UserError
+from hmcs.fixtures.exchanged import Guides
+from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
 
+MOST_LENT = 32
+"""So many recognizers of other names may stand on loaded models; the oldest one goes first."""
 
-def load_models(places: Iterable[Path]) -> dict[str, Model]:
+
+class Loaded(NamedTuple):
+    """A model and what a fixture takes from it."""
+
+    model: Model
+    guides: Guides
+
+
+class Recognizers(dict[str, Loaded]):
+    """Loaded models by recognizer: each by its own name, and by those that say they stand on it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lent: list[str] = []
+
+    def take(self, loaded: Loaded) -> None:
+        """Take a model in under its own name, instead of another of that name."""
+        self[loaded.model.name] = loaded
+        if loaded.model.name in self._lent:
+            self._lent.remove(loaded.model.name)
+
+    def of(self, recognizer: str, model_hash: str) -> Loaded | None:
+        """Return what a recognizer stands on: the model of its name, or the one of that hash."""
+        known = self.get(recognizer)
+        if known is not None:
+            return known
+        return next((known for known in self.values() if known.model.hash == model_hash), None)
+
+    def lend(self, recognizer: str, loaded: Loaded, *, keep: str) -> list[str]:
+        """Let a recognizer of another name stand on a model; return those forgotten for it.
+
+        `keep` is not forgotten.
+        """
+        self[recognizer] = loaded
+        self._lent.append(recognizer)
+        if len(self._lent) <= MOST_LENT:
+            return []
+        oldest = next(name for name in self._lent if name != keep)
+        self._lent.remove(oldest)
+        del self[oldest]
+        return [oldest]
+
+
+def load_models(places: Iterable[Path], model_key: Path | None = None) -> dict[str, Model]:
     """Return the models in files, and in folders of `*.hmcs` files, by name.
 
     Raises ModelFileError for a file that cannot be used, UserError for a folder without files and
@@ -19,7 +67,7 @@ def load_models(places: Iterable[Path]) -> dict[str, Model]:
     models: dict[str, Model] = {}
     for place in places:
         for file in model_files(place):
-            model = load_model(file)
+            model = load_model(file, verify=signed_by(model_key))
             if models.setdefault(model.name, model).hash != model.hash:
                 raise UserError(
                     f"{file}: a second, different model named {model.name!r}: leave one of them "

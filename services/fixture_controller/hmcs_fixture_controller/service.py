@@ -1,17 +1,19 @@
 """The service: samples in, commands out, at once; steps and beliefs change the fixture meanwhile.
 
 The fast loop is the handler of Motion: what the robot is to do is computed and sent in it, so
-from the operator to the robot there are two hops whatever recognition does.
+from the operator to the robot there are two hops whatever recognition does. Model files are read,
+and their guides and regions made, on a thread beside it.
 """
 
 from __future__ import annotations
 
 import logging
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import ClassVar
 
-from hmcs.bus.keys import ANY
+from hmcs.bus.keys import ANY, recognizer_in
 from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import (
     ActivateRecognizer,
@@ -25,30 +27,37 @@ from hmcs.bus.messages import (
     Message,
     Motion,
     Origin,
+    Pairing,
     RobotState,
+    Source,
     Step,
 )
 from hmcs.bus.service import Service, UserError
-from hmcs.bus.session import Bus, Received
+from hmcs.bus.session import Bus, Publisher, Received
+from hmcs.bus.verbs import ACTIVATE, LAST_STEPS, LOAD_MODEL
+from hmcs.controller_feed import ControllerFeed
 from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.driver import Driver
-from hmcs.fixtures.exchanged import Fixture, UnknownModelError
+from hmcs.fixtures.exchanged import Fixture, Guides
+from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.translation import guides_of, sample_of, segment_belief_of
-from hmcs_fixture_controller.models import load_models
+from hmcs.translation import guides_of
+from hmcs_fixture_controller.models import Loaded, Recognizers, load_models
 from hmcs_fixture_controller.settings import FixtureControllerSettings
+from hmcs_fixture_controller.speakers import Speakers
 from hmcs_fixture_controller.translation import command_of, state_of
 
 PAST_STEPS = 1000
 """How many steps are fetched at the start: segments that began before it need their origin."""
 WATCH_MARGIN_S = 0.001
 """How much later than it may be stale the input is looked at again."""
+PAIRING_EVERY_S = 0.2
+"""How often it is said again which device drives which robot."""
 NS_PER_S = 1_000_000_000
 
 
 class FixtureController(Service):
-    """Lends the operator a ruler while it is recognized what the hand is about to do."""
+    """Makes the operator's velocity the robot's, along the path that is recognized."""
 
     name: ClassVar[str] = "fixture_controller"
     Settings = FixtureControllerSettings
@@ -57,82 +66,101 @@ class FixtureController(Service):
         super().__init__(settings, bus, log)
         self._seldom = Seldom(log)
         self._controller = Controller(settings.safeguards)
-        self._driver = Driver(settings.safeguards.input_stale_after_s)
-        self._clock = ""
-        self._next_step = 0
+        self._feed = ControllerFeed(self._controller)
+        self._recognizers = Recognizers()
+        self._speakers = Speakers()
+        self._robots: set[str] = set()
+        """Instances of the robots that are present."""
         self._fixture: Fixture | None = None
         self._robot: RobotState | None = None
-        self._models: dict[str, Model] = {}
-        for model in load_models(settings.models).values():
-            self._load(model)
+        self._paired: Pairing | None = None
+        self._pairings: Publisher[Pairing] | None = None
+        self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
+        for model in load_models(settings.models, settings.model_key).values():
+            self._adopt(model, guides_of(model))
         if settings.active_model is not None:
-            self.activate(settings.active_model)
+            self._follow(settings.active_model)
         self._commands = bus.publisher(Command, bus.keys.command)
         self._states = bus.publisher(FixtureState, bus.keys.fixture_state)
 
     def start(self) -> None:
         """Catch up with the steps there were, and begin to command."""
         bus = self.bus
+        self._pairings = bus.publisher(Pairing, bus.keys.pairing)
+        bus.watch(bus.keys.presence(), self._on_presence)
+        bus.watch(bus.keys.member(ANY), self._on_member)
         bus.subscribe(Motion, bus.keys.motion, self._on_motion)
         bus.subscribe(Step, bus.keys.step, self._on_step)
-        bus.subscribe(Belief, bus.keys.belief(ANY), self._on_belief)
+        bus.subscribe(Belief, bus.keys.belief(), self._on_belief)
         bus.subscribe(RobotState, bus.keys.robot_state, self._on_robot_state)
-        bus.answer(
-            "activate", ActivateRecognizer, lambda asked: Done(detail=self.activate(asked.model))
-        )
-        bus.answer("load_model", LoadModel, lambda asked: Done(detail=self.load(Path(asked.path))))
+        ACTIVATE.answer(bus, self._on_activate)
+        LOAD_MODEL.answer(bus, self._on_load_model, aside=self._files)
         self._fetch_past_steps()
+        bus.every(PAIRING_EVERY_S, self._say_pairing)
         self._watch_input()
 
     def health(self) -> tuple[bool, str]:
-        """Say what it does: guiding, or why not."""
-        fixture, robot = self._fixture, self._robot
+        """Say what it does: guiding, or why not; unhealthy while nobody runs what it follows."""
+        fixture, robot, active = self._fixture, self._robot, self._controller.active
         if fixture is None or fixture.reason == "input_stale":
             doing = "idle: no operator input"
         else:
             doing = f"{fixture.reason}, {fixture.law} law, factor {fixture.factor:.2f}"
             doing += "; its plan is stuck and asks for help" if fixture.asks_for_help else ""
         stands = f"; {robot.robot} stands: {robot.stop}" if robot and robot.stop != "none" else ""
-        return True, f"{doing}; follows {self._controller.active or 'no model'}{stands}"
+        now_s = _now_s()
+        unheard = bool(active) and not self._speakers.living(active, now_s)
+        follows = f"{active or 'no model'}{', which no process runs' if unheard else ''}"
+        lost = self._speakers.lost(active, now_s)
+        return not lost, f"{doing}; follows {follows}{stands}"
 
     def facts(self) -> dict[str, str]:
-        """Name the models and which of them is followed."""
+        """Name the models, which of them is followed, who runs it, who drives, and which robot."""
         active = self._controller.active
         return {
-            "models": ", ".join(f"{name} {m.hash}" for name, m in self._models.items()),
+            "models": ", ".join(
+                f"{name} {known.model.hash}" for name, known in self._recognizers.items()
+            ),
             "active_model": active,
-            "model_hash": self._models[active].hash if active else "",
+            "model_hash": self._recognizers[active].model.hash if active else "",
+            "active_run_by": ", ".join(self._speakers.living(active, _now_s())),
+            "device": self._feed.device.instance,
+            "robot": self._feed.robot.instance,
         }
+
+    def close(self) -> None:
+        """Read no more files."""
+        self._files.shutdown(wait=False, cancel_futures=True)
 
     # --- the fast loop ----------------------------------------------------------------------------
 
     def _on_motion(self, received: Received[Motion]) -> None:
         source = received.envelope.source
         now_s = received.received_ns / NS_PER_S
-        if time.monotonic_ns() / NS_PER_S - now_s > self.settings.safeguards.input_stale_after_s:
+        if _now_s() - now_s > self.settings.safeguards.input_stale_after_s:
             self.bus.counters.count_late(Motion.SCHEMA)
             return
-        verdict = self._driver.heard(now_s, source.boot, received.envelope.seq)
-        if verdict == "second_device":
-            self._refuse(Motion, f"{source.instance} is a second input device: stop one of them")
-        elif verdict == "old":
-            self.bus.counters.count_late(Motion.SCHEMA)
-        else:
-            if source.boot != self._clock:
-                self._begin_clock(source.boot)
-            envelope = received.envelope
-            sample = sample_of(received.body, envelope.seq, envelope.origin)
-            self._send(self._controller.sampled(now_s, sample), envelope.origin)
+        envelope, before = received.envelope, self._feed.device.boot
+        fixture = self._feed.on_motion(now_s, source, envelope.seq, received.body, envelope.origin)
+        if self._feed.device.boot != before:
+            self._say_pairing()
+        if fixture is None:
+            self._refuse_second(Motion, "input device", source, self._feed.device.instance)
+            return
+        self._send(fixture, envelope.origin)
 
     def _watch_input(self) -> None:
         """Command the stop when the operator's samples stay out, and again while they do."""
         now_ns = time.monotonic_ns()
-        if self._controller.input_stale(now_ns / NS_PER_S):
-            self._send(self._controller.waited(now_ns / NS_PER_S), None)
-            wait_s = self.settings.stop_repeated_every_ms / 1e3
-        else:
-            wait_s = self._controller.input_good_for_s(now_ns / NS_PER_S) + WATCH_MARGIN_S
-        self.bus.at(now_ns + round(wait_s * NS_PER_S), self._watch_input)
+        wait_s = self.settings.stop_repeated_every_ms / 1e3
+        try:
+            if self._controller.input_stale(now_ns / NS_PER_S):
+                self._send(self._controller.waited(now_ns / NS_PER_S), None)
+            else:
+                wait_s = self._controller.input_good_for_s(now_ns / NS_PER_S) + WATCH_MARGIN_S
+        finally:
+            # Whatever went wrong this time must not be the end of the watch.
+            self.bus.at(now_ns + round(wait_s * NS_PER_S), self._watch_input)
 
     def _send(self, fixture: Fixture, origin: Origin | None) -> None:
         self._commands.put(command_of(fixture, self.settings.command_valid_for_ms), origin)
@@ -146,133 +174,186 @@ class FixtureController(Service):
     # --- the slow loop ----------------------------------------------------------------------------
 
     def _on_step(self, received: Received[Step]) -> None:
-        source, origin = received.envelope.source, received.envelope.origin
+        source, step = received.envelope.source, received.body
         now_s = received.received_ns / NS_PER_S
-        if source.boot != self._clock:
-            if self._clock and not self._driver.admits(now_s, source.boot):
-                self._refuse(Step, f"{source.instance} is a second input device: stop one of them")
-                return
-            self._begin_clock(source.boot)
-        self._take_step(now_s, received.body, origin)
-
-    def _take_step(self, now_s: float, step: Step, origin: Origin | None) -> None:
-        if step.index < self._next_step:
-            self._refuse(
-                Step, f"step {step.index} came again or jumped back: expected {self._next_step}"
-            )
-            return
-        self._next_step = step.index + 1
-        number = None if origin is None else origin.seq
-        self._controller.stepped(now_s, step.index, step.position, step.displacement, number)
-
-    def _begin_clock(self, clock: str) -> None:
-        self._clock, self._next_step = clock, 0
-        self._controller.forget()
+        verdict = self._feed.on_step(now_s, source, step, received.envelope.origin)
+        if verdict == "second":
+            self._refuse_second(Step, "input device", source, self._feed.device.instance)
+        elif verdict == "old":
+            self._refuse(Step, f"step {step.index} came again or jumped")
 
     def _fetch_past_steps(self) -> None:
-        bus = self.bus
-        key = bus.keys.rpc("input_device", ANY, "last_steps")
-        answers = bus.ask(key, LastStepsQuestion(count=PAST_STEPS), LastSteps, timeout_s=0.5)
+        answers = LAST_STEPS.ask(self.bus, LastStepsQuestion(count=PAST_STEPS), timeout_s=0.5)
         for answer in answers[:1]:
-            self.take_past_steps(answer.body)
+            self.take_past_steps(answer.body, answer.envelope.source)
 
-    def take_past_steps(self, last: LastSteps) -> None:
+    def take_past_steps(self, last: LastSteps, source: Source) -> None:
         """Begin with the steps that were made before this process came up."""
-        now_s = time.monotonic_ns() / NS_PER_S
-        self._begin_clock(last.clock)
+        now_s = _now_s()
         for step, origin in zip(last.steps, last.origins, strict=False):
-            self._take_step(now_s, step, origin)
+            self._feed.on_step(now_s, source, step, origin)
 
     def _on_belief(self, received: Received[Belief]) -> None:
-        belief, bus = received.body, self.bus
-        before, after = bus.keys.belief(ANY).split(ANY)
-        name = received.key.removeprefix(before).removesuffix(after)
-        model = self._model_of(name, belief.model_hash)
-        if model is None:
+        belief, source = received.body, received.envelope.source
+        name = recognizer_in(received.key).model
+        known = self._recognizers.of(name, belief.model_hash)
+        if known is None:
             self._refuse(
                 Belief,
                 f"recognizer {name!r} speaks of model {belief.model_hash}, which is not loaded "
                 "here: ask for `load_model` first",
             )
             return
-        if belief.model_hash != model.hash:
+        if belief.model_hash != known.model.hash:
             self._refuse(
                 Belief,
-                f"it is of model {name!r} {belief.model_hash}, loaded is {model.hash}: "
+                f"it is of model {name!r} {belief.model_hash}, loaded is {known.model.hash}: "
                 "give both sides the same file",
             )
             return
-        if belief.clock != self._clock:
-            bus.counters.count_late(Belief.SCHEMA)
-            return
+        if name not in self._recognizers:
+            for forgotten in self._recognizers.lend(name, known, keep=self._controller.active):
+                self._controller.unload(forgotten)
+            self._controller.load(name, known.guides)
         try:
-            newer = self._controller.believed(name, segment_belief_of(belief))
+            verdict = self._feed.on_belief(name, belief)
         except ValueError as error:
             self._refuse(Belief, str(error))
             return
-        if not newer:
-            bus.counters.count_late(Belief.SCHEMA)
-        elif not self._controller.active:
-            self.activate(name)
+        if verdict in ("old", "other_clock"):
+            self.bus.counters.count_late(Belief.SCHEMA)
+            return
+        self._speakers.heard(name, source, received.received_ns / NS_PER_S)
+        if not self._controller.active:
+            self._follow(name)
 
     def _on_robot_state(self, received: Received[RobotState]) -> None:
-        self._robot = received.body
-        robot = received.body
-        self._controller.robot_moved(
-            received.received_ns / NS_PER_S, robot.tool_position, robot.tool_orientation
-        )
+        source, before = received.envelope.source, self._feed.robot.boot
+        now_s = received.received_ns / NS_PER_S
+        verdict = self._feed.on_robot(now_s, source, received.body, self._robots)
+        if self._feed.robot.boot != before:
+            self._say_pairing()
+        if verdict == "second":
+            self._refuse_second(RobotState, "robot", source, self._feed.robot.instance)
+        else:
+            self._robot = received.body
 
-    def _model_of(self, recognizer: str, model_hash: str) -> Model | None:
-        """The model of that recognizer; one of another name may stand on any loaded model."""
-        if recognizer not in self._models:
-            for model in tuple(self._models.values()):
-                if model.hash == model_hash:
-                    self._lend(recognizer, model)
-                    break
-        return self._models.get(recognizer)
+    # --- who is there -----------------------------------------------------------------------------
+
+    def _on_presence(self, key: str, alive: bool) -> None:
+        member = self.bus.keys.member_of(key)
+        if member.service == "robot":
+            (self._robots.add if alive else self._robots.discard)(member.instance)
+        self._speakers.present(member, alive)
+
+    def _on_member(self, key: str, alive: bool) -> None:
+        model, member = self.bus.keys.model_of(key), self.bus.keys.member_of(key)
+        self._speakers.at_work(model, member, alive)
+        if not alive and self._speakers.lost(self._controller.active, _now_s()):
+            self.log.warning(
+                "no process runs the recognizer that is followed",
+                extra={"model": self._controller.active},
+            )
+
+    def _say_pairing(self) -> None:
+        device, robot = self._feed.device, self._feed.robot
+        drives = "" if device.silent(_now_s()) else device.boot
+        pairing = Pairing(
+            device=drives,
+            device_instance=device.instance if drives else "",
+            robot=robot.boot,
+            robot_instance=robot.instance,
+        )
+        if pairing != self._paired:
+            self.log.info(
+                "paired", extra={"device": pairing.device_instance, "robot": robot.instance}
+            )
+            self._paired = pairing
+        if self._pairings is not None:
+            self._pairings.put(pairing)
 
     # --- recognizers ------------------------------------------------------------------------------
 
     def load(self, path: Path) -> str:
         """Load a model file, instead of one of the same name; return what is so now.
 
-        Raises ModelFileError where it cannot be used; nothing changes then.
+        The file is read and its guides are made on the calling thread; the loop only takes them
+        over. Raises ModelFileError or RegionError where it cannot be used; nothing changes then.
         """
-        model, followed = load_model(path), self._models.get(self._controller.active)
-        told = self._load(model)
-        if followed is None or followed.task.name == model.task.name:
+        model = load_model(path, verify=signed_by(self.settings.model_key))
+        guides = guides_of(model)
+        return self.bus.in_loop(lambda: self._take_over(model, guides))
+
+    def activate(self, name: str) -> str:
+        """Follow a loaded recognizer from now on; return what is so now.
+
+        Raises UserError where it is not loaded, or no process runs it.
+        """
+        self._check_loaded(name)
+        now_s = _now_s()
+        if not self._speakers.living(name, now_s):
+            raise UserError(
+                f"no process runs recognizer {name!r}, so that nothing would be recognized; those "
+                f"that run: {', '.join(self._speakers.names(now_s)) or 'none'}. Start it first"
+            )
+        return self._follow(name)
+
+    def _on_activate(self, asked: ActivateRecognizer) -> Done:
+        return Done(detail=self.activate(asked.model))
+
+    def _on_load_model(self, asked: LoadModel) -> Done:
+        return Done(detail=self.load(Path(asked.path)))
+
+    def _take_over(self, model: Model, guides: Guides) -> str:
+        followed = self._recognizers.get(self._controller.active)
+        told = self._adopt(model, guides)
+        if followed is None or followed.model.task.name == model.task.name:
             return told
+        before = followed.model.task.name
         self.log.warning(
             "a model of another task",
-            extra={"model": model.name, "task": model.task.name, "followed": followed.task.name},
+            extra={"model": model.name, "task": model.task.name, "followed": before},
         )
         return (
             f"{told}; mind that it is of task {model.task.name!r}, the followed one of "
-            f"{followed.task.name!r}: its guides and limits are those of its own task"
+            f"{before!r}: its guides and limits are those of its own task"
         )
 
-    def activate(self, name: str) -> str:
-        """Follow the recognizer of a loaded model from now on; return what is so now.
-
-        Raises UserError where it is not loaded.
-        """
-        try:
-            self._controller.activate(name)
-        except UnknownModelError as error:
-            raise UserError(str(error)) from error
-        self.log.info("recognizer activated", extra={"model": name})
-        return f"follows {name} {self._models[name].hash}"
-
-    def _lend(self, recognizer: str, model: Model) -> None:
-        self._models[recognizer] = model
-        self._controller.load(recognizer, guides_of(model))
-
-    def _load(self, model: Model) -> str:
-        self._lend(model.name, model)
+    def _adopt(self, model: Model, guides: Guides) -> str:
+        self._controller.load(model.name, guides)
+        self._recognizers.take(Loaded(model, guides))
         self.log.info("model loaded", extra={"model": model.name, "hash": model.hash})
         return f"model {model.name} {model.hash} is loaded"
+
+    def _check_loaded(self, name: str) -> None:
+        if name not in self._recognizers:
+            raise UserError(
+                f"model {name!r} is not loaded; loaded: {', '.join(self._recognizers) or 'none'}. "
+                "Load its file first, or name one of these"
+            )
+
+    def _follow(self, name: str) -> str:
+        self._check_loaded(name)
+        self._controller.activate(name)
+        self.log.info("recognizer activated", extra={"model": name})
+        return f"follows {name} {self._recognizers[name].model.hash}"
+
+    # --- refusals ---------------------------------------------------------------------------------
+
+    def _refuse_second(
+        self, message_type: type[Message], kind: str, source: Source, paired: str
+    ) -> None:
+        self._refuse(
+            message_type,
+            f"{source.instance} is a second {kind}, while {paired or 'none'} is paired: "
+            "stop one of them",
+        )
 
     def _refuse(self, message_type: type[Message], reason: str) -> None:
         schema = message_type.SCHEMA
         self.bus.counters.count_refused(schema, reason)
         self._seldom.warning(schema, f"{schema} refused", reason=reason)
+
+
+def _now_s() -> float:
+    return time.monotonic_ns() / NS_PER_S

@@ -46,6 +46,7 @@ class FixtureControllerSettings(ServiceSettings):
             settle_s=self.settle_ms / 1e3,
             belief_stale_after_s=self.belief_stale_after_ms / 1e3,
             unknown_limit=self.unknown_limit,
+            command_valid_for_s=self.command_valid_for_ms / 1e3,
             damping_n_s_per_m=self.damping_n_s_per_m,
             angular_damping_n_m_s_per_rad=self.angular_damping_n_m_s_per_rad,
         )

@@ -195,7 +195,7 @@ def test_a_controller_that_comes_late_knows_the_origin_of_the_segment(
         for i in range(100)
     )
     last = LastSteps(clock=device.bus.source.boot, steps=steps, origins=(device.origin(),) * 100)
-    cell.service.take_past_steps(last)
+    cell.service.take_past_steps(last, device.bus.source)
     device.step = 100
     cell.engage()
     state = cell.guide_until_stiff(load_model(path).hash)

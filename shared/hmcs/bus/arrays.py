@@ -24,6 +24,10 @@ FROM_WIRE = "from wire"
 UNIT_WITHIN = 1e-3
 """How much the length of a unit vector may differ from one."""
 
+LARGEST = 1e9
+"""No position, speed, force or time of a cell is beyond it in SI units; products and sums of what
+is within stay finite."""
+
 
 @dataclass(frozen=True)
 class ArraySpec:
@@ -38,8 +42,8 @@ class ArraySpec:
         """Return `value`, a wire map or an array-like, as a read-only array.
 
         From the wire only the map is admitted. Raises ValueError when it is none, when the dtype,
-        the shape or the byte count is not what the field admits, a number is not finite, or the
-        length is not one where the field says so.
+        the shape or the byte count is not what the field admits, a number is not finite or beyond
+        LARGEST, or the length is not one where the field says so.
         """
         try:
             if isinstance(value, dict):
@@ -56,8 +60,9 @@ class ArraySpec:
             for want, got in zip(self.shape, array.shape, strict=True)
         ):
             raise ValueError(f"array has shape {array.shape}, expected {self.shape_text}")
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise ValueError("array holds a number that is not finite")
+        # A comparison with NaN is false, so that this refuses it as well.
+        if array.dtype.kind == "f" and array.size and not np.abs(array).max() <= LARGEST:
+            raise ValueError(f"array holds a number that is not finite or beyond {LARGEST:g}")
         if self.unit and abs(math.hypot(*array.tolist()) - 1.0) > UNIT_WITHIN:
             raise ValueError(f"array is {array.tolist()}, expected a length of 1")
         return array

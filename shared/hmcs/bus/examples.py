@@ -25,6 +25,7 @@ from hmcs.bus.messages import (
     Origin,
     Outline,
     OutlineQuestion,
+    Pairing,
     Record,
     Refusal,
     RobotLooks,
@@ -33,6 +34,7 @@ from hmcs.bus.messages import (
     SettingsReport,
     Source,
     Step,
+    StopRequest,
     Train,
     TrainingProgress,
 )
@@ -109,8 +111,16 @@ EXAMPLES: tuple[Message, ...] = (
         engaged=True,
         reason="guiding",
     ),
+    Pairing(
+        device="5f0c1d2e3a4b",
+        device_instance="hand-1",
+        robot="77aa01bc23de",
+        robot_instance="robot-1",
+    ),
+    StopRequest(reason="hmcs stop"),
     RobotState(
         robot="puma560",
+        joint_names=("waist", "shoulder", "elbow", "wrist_roll", "wrist_bend", "wrist_swivel"),
         joint_positions=np.array([0.0, 0.5, -1.0, 0.0, 0.25, 0.0]),
         joint_velocities=np.array([0.0, 0.125, 0.0, 0.0, 0.0, 0.0]),
         tool_position=np.array([0.45, -0.15, 0.43]),
@@ -122,6 +132,8 @@ EXAMPLES: tuple[Message, ...] = (
         contacts=("post",),
         stop="none",
         limited=("speed", "joint_3"),
+        region_distance_m=0.125,
+        late_ticks=2,
     ),
     Handle(
         operator="page-1",

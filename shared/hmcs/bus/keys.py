@@ -23,13 +23,29 @@ class KeyNameError(UserError, ValueError):
     """A name that cannot be part of a key."""
 
 
+def recognizer_in(key: str) -> Recognizer:
+    """Return the model and the instance that a belief or evidence key of any cell names.
+
+    Raises KeyNameError for any other key.
+    """
+    chunks = key.removeprefix(f"{PREFIX}/").split("/")[1:]
+    if len(chunks) in (3, 4) and chunks[0] == "model" and chunks[2] in ("belief", "evidence"):
+        return Recognizer(chunks[1], chunks[3] if len(chunks) == 4 else "")
+    raise KeyNameError(f"{key!r} is no belief or evidence key")
+
+
+def is_name(text: str) -> bool:
+    """Return whether `text` can be one chunk of a key; see `check_name`."""
+    return _NAME.fullmatch(text) is not None
+
+
 def check_name(what: str, name: str) -> str:
     """Return `name` if it can be one chunk of a key.
 
     Raises KeyNameError for anything but 1 to 64 letters, digits, `.`, `_`, `-`, beginning with a
     letter or digit; so for `*`, `$`, `/`, `?`, `#`, `@`, which mean something in a key.
     """
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise KeyNameError(
             f"{what} {name!r} cannot be part of a key: use 1 to 64 letters, digits, '.', '_' or "
             "'-', beginning with a letter or digit"
@@ -42,6 +58,14 @@ class Member(NamedTuple):
 
     service: str
     instance: str
+
+
+class Recognizer(NamedTuple):
+    """One process that speaks for a model, as a belief or evidence key names it."""
+
+    model: str
+    instance: str
+    """Empty in recordings made before keys of beliefs named it."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +101,16 @@ class Keys:
         return self._key("fixture", "state")
 
     @property
+    def pairing(self) -> str:
+        """Pairing, fixture controller to all."""
+        return self._key("fixture", "pairing")
+
+    @property
+    def stop_request(self) -> str:
+        """StopRequest, whoever watches over the cell to every robot."""
+        return self._key("robot", "stop")
+
+    @property
     def robot_state(self) -> str:
         """RobotState, robot to all."""
         return self._key("robot", "state")
@@ -105,9 +139,9 @@ class Keys:
         """Evidence, a classifier to the task HMM of the same model."""
         return self._key("model", _chunk("model", model), "evidence", _chunk("instance", instance))
 
-    def belief(self, model: str = ANY) -> str:
+    def belief(self, model: str = ANY, instance: str = ANY) -> str:
         """Belief, a task HMM to the fixture controller."""
-        return self._key("model", _chunk("model", model), "belief")
+        return self._key("model", _chunk("model", model), "belief", _chunk("instance", instance))
 
     def member(self, model: str, service: str = ANY, instance: str = ANY) -> str:
         """Liveliness token of a process that works for a model, replayed and ready."""
@@ -140,6 +174,13 @@ class Keys:
         ):
             return Member(chunks[-2], chunks[-1])
         raise KeyNameError(f"{key!r} is no presence or member key of cell {self.cell!r}")
+
+    def model_of(self, key: str) -> str:
+        """Return the model a member key names. Raises KeyNameError for any other key."""
+        chunks = key.removeprefix(f"{PREFIX}/{self.cell}/").split("/")
+        if len(chunks) == 5 and (chunks[0], chunks[2]) == ("model", "member"):
+            return chunks[1]
+        raise KeyNameError(f"{key!r} is no member key of cell {self.cell!r}")
 
     def _key(self, *chunks: str) -> str:
         return "/".join((PREFIX, self.cell, *chunks))

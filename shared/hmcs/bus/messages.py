@@ -16,11 +16,14 @@ step s as its first and x_s as its origin.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic_core import core_schema
 
 from hmcs.bus.arrays import (
+    LARGEST,
     EvidenceFloats,
     Floats,
     Indices,
@@ -30,8 +33,30 @@ from hmcs.bus.arrays import (
     Vector6,
 )
 
+
+@dataclass(frozen=True)
+class Within:
+    """Refuses numbers whose magnitude is beyond `largest`; its JSON Schema does not say so."""
+
+    largest: int | float
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, value: Any) -> Any:
+        if not -self.largest <= value <= self.largest:
+            raise ValueError(f"{value!r} is beyond {self.largest:g}")
+        return value
+
+
 Name = Annotated[str, Field(min_length=1, max_length=64)]
-Count = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=0), Within(2**53)]
+"""Nothing counts further: a thousand a second for 285 000 years. Sums of counts still fit into a
+message."""
+Nanoseconds = Annotated[int, Within(2**63 - 1)]
+Real = Annotated[float, Within(LARGEST)]
 
 
 class Part(BaseModel):
@@ -72,7 +97,7 @@ class Origin(Part):
     """Boot of the input device that captured the sample."""
     seq: Count
     """Sequence number of its Motion."""
-    captured_ns: int
+    captured_ns: Nanoseconds
     """Capture time by that device's own monotonic clock, ns; comparable only where it was taken."""
 
 
@@ -168,7 +193,7 @@ class FixtureState(Message):
     guide_origin: Vector3 | None = None
     """Where that path begins for the robot, m, base frame, shape (3,); None in free motion, and
     where nobody knows."""
-    off_guide_m: Annotated[float, Field(ge=0)] | None = None
+    off_guide_m: Annotated[float, Field(ge=0), Within(LARGEST)] | None = None
     """How far the robot is beside the path; None as for `guide_origin`."""
     operator_twist: Vector6
     """The operator's velocity as the law saw it, shape (6,)."""
@@ -193,14 +218,48 @@ class FixtureState(Message):
     """Why the fixture is as stiff as it is."""
 
 
+class Pairing(Message):
+    """Which input device drives which robot, as the fixture controller has decided it.
+
+    Published when it changes, and a few times a second. Recognizers follow the steps of that device
+    alone; a robot that is not named takes no commands of this fixture controller.
+    """
+
+    SCHEMA = "pairing"
+
+    device: str
+    """Boot of the input device that drives; empty while none does."""
+    device_instance: str
+    """Its instance; empty while none does."""
+    robot: str
+    """Boot of the robot that follows, and whose pose the fixture takes; empty while none does."""
+    robot_instance: str
+    """Its instance; empty while none does."""
+
+
+class StopRequest(Message):
+    """Somebody wants every robot of the cell to stand.
+
+    It holds like the answer to the question `stop`: until the operator lets go and takes hold
+    again. It needs no answer, so that a robot hears it whatever hangs beside it.
+    """
+
+    SCHEMA = "stop_request"
+
+    reason: str
+    """Who wants it and why, in one line."""
+
+
 class RobotState(Message):
     """Where the robot is and what it touches."""
 
     SCHEMA = "robot_state"
-    VERSION = 2
+    VERSION = 3
 
     robot: Name
     """Which robot, e.g. `puma560`."""
+    joint_names: tuple[str, ...] = ()
+    """As in the robot's URDF, in the order of `joint_positions`; empty where they have none."""
     joint_positions: Floats
     """rad, shape (n,)."""
     joint_velocities: Floats
@@ -215,7 +274,7 @@ class RobotState(Message):
     """The velocity it is following now, after its own limits, shape (6,)."""
     nearest_obstacle: str
     """Name of the nearest obstacle; empty where none is within reach of the search."""
-    nearest_distance_m: Annotated[float, Field(ge=-1)] | None
+    nearest_distance_m: Annotated[float, Field(ge=-1), Within(LARGEST)] | None
     """Distance to it; None where none is within reach of the search; negative in penetration."""
     contacts: tuple[str, ...]
     """Names of what the robot touches."""
@@ -226,13 +285,22 @@ class RobotState(Message):
         "stale_command",
         "refused_command",
         "second_writer",
+        "not_paired",
+        "late_tick",
         "collision",
         "asked",
     ]
     """Why the robot stands; `none` while it follows commands, `asked` after somebody asked it to
-    `stop`."""
+    `stop`, `not_paired` while the fixture controller drives another robot, `late_tick` after its
+    own control loop came too late."""
     limited: tuple[str, ...]
-    """Limits that shape the motion now, e.g. `speed`, `workspace`, `joint_3`, `singularity`."""
+    """Limits that shape the motion now, e.g. `speed`, `workspace`, `region`, `joint_3`,
+    `singularity`."""
+    region_distance_m: Annotated[float, Field(ge=-1), Within(LARGEST)] | None = None
+    """From the tool to the nearest forbidden region of its task; negative inside; None where there
+    is none within reach of the search."""
+    late_ticks: Count = 0
+    """Control ticks that came later than a period after they were due, since the robot started."""
 
 
 # --- the slow loop: steps, evidence, belief -------------------------------------------------------
@@ -306,9 +374,9 @@ class Belief(Message):
     """The most probable gesteme in the most probable state; empty while nothing is likely."""
     segment_start: Count
     """The most probable start step s of the most probable state's segment."""
-    log_likelihood: float = 0.0
+    log_likelihood: Real = 0.0
     """Of step t given all before it, against the background level, nats."""
-    mean_log_likelihood: float = 0.0
+    mean_log_likelihood: Real = 0.0
     """How well the last steps fit the task: mean over the model's alarm window, nats."""
     unknown_alarm: bool = False
     """True where that mean is below the threshold learned from the demonstrations."""
@@ -388,11 +456,11 @@ class Health(Message):
     """True when it does what it is for."""
     detail: str
     """One line: what it does, or what it waits for."""
-    uptime_s: float
+    uptime_s: Real
     """Since the process started."""
-    loop_rate_hz: float
+    loop_rate_hz: Real
     """Messages and timers handled per second, over the last second."""
-    cpu_s: float
+    cpu_s: Real
     """Processor time used since the process started."""
     received: dict[str, int]
     """Messages received, per schema."""
@@ -539,7 +607,7 @@ class Outline(Message):
     """Name of the file this is the outline of."""
     path: str
     """Of that file, as the recorder sees it."""
-    duration_s: Annotated[float, Field(ge=0)]
+    duration_s: Annotated[float, Field(ge=0), Within(LARGEST)]
     """From its first message to its last."""
     time_s: Floats
     """Since its first message, rising, shape (n,)."""
@@ -584,6 +652,8 @@ MESSAGES: tuple[type[Message], ...] = (
     Belief,
     Command,
     FixtureState,
+    Pairing,
+    StopRequest,
     RobotState,
     Handle,
     Label,

@@ -17,8 +17,10 @@ from hmcs.bus.messages import (
     Label,
     Message,
     Motion,
+    Pairing,
     RobotState,
     Step,
+    StopRequest,
     TrainingProgress,
 )
 
@@ -61,6 +63,14 @@ STANCES: dict[type[Message], Stance] = {
     FixtureState: Stance(
         "data", "drop", "reliable", "every_one",
         "For observers and recorders; behind whatever moves the robot.",
+    ),
+    Pairing: Stance(
+        "interactive_high", "drop", "reliable", "newest_wins",
+        "Who drives whom as it is now; it is said again a few times a second.",
+    ),
+    StopRequest: Stance(
+        "real_time", "drop", "reliable", "every_one",
+        "A stop goes before everything else, and each one is heard.",
     ),
     RobotState: Stance(
         "data_high", "drop", "reliable", "newest_wins",

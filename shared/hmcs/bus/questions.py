@@ -13,7 +13,7 @@ from hmcs.bus.connecting import StoppedError
 from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Envelope, Message, Refusal
 from hmcs.bus.reading import Reader
-from hmcs.bus.wire import RefusedMessageError, decode, encode
+from hmcs.bus.wire import RefusedMessageError, check_size, decode, encode
 from hmcs.errors import UserError
 
 A = TypeVar("A", bound=Message)
@@ -73,8 +73,10 @@ def read_answers(
     """
     answers = []
     for sample in samples:
-        data = sample.payload.to_bytes()
+        data = b""
         try:
+            check_size(len(sample.payload), answer_type, Refusal)
+            data = sample.payload.to_bytes()
             answers.append(Answer(*decode(data, answer_type)))
         except RefusedMessageError as error:
             reason = _refusal_in(data)
@@ -104,7 +106,8 @@ def reply(
     with query:
         try:
             payload = query.payload
-            _, question = decode(payload.to_bytes() if payload else b"", question_type)
+            check_size(0 if payload is None else len(payload), question_type)
+            _, question = decode(b"" if payload is None else payload.to_bytes(), question_type)
             answer = handler(question)
         except RefusedMessageError as error:
             reader.refuse(question_type.SCHEMA, key, error)
@@ -117,6 +120,12 @@ def reply(
         query.reply(key, encode(answer, stamp()))
     if failure is not None:
         raise failure
+
+
+def refuse_busy(query: zenoh.Query, key: str, stamp: Callable[[], Envelope]) -> None:
+    """Reply to `query` that too many others wait already."""
+    with query:
+        query.reply(key, encode(Refusal(reason=f"{key}: too many questions at once"), stamp()))
 
 
 def _refusal_in(data: bytes) -> str | None:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Generic, NamedTuple, TypeVar
 
-import msgpack
-
 from hmcs.bus.counters import Counters, Sequences
 from hmcs.bus.logs import Seldom
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Envelope, Message
-from hmcs.bus.wire import RefusedMessageError, decode
+from hmcs.bus.wire import RefusedMessageError, check_size, decode, envelope_of
 
 M = TypeVar("M", bound=Message)
 
@@ -44,10 +42,11 @@ class Reader:
         schema = message_type.SCHEMA
         self._counters.received[schema] += 1 + arrival.overwritten
         try:
+            check_size(arrival.size_bytes, message_type)
             envelope, body = decode(arrival.payload, message_type)
         except RefusedMessageError as error:
             self.refuse(schema, arrival.key, error)
-            refused = _envelope_of(arrival.payload)
+            refused = envelope_of(arrival.payload, message_type)
             if refused is not None:
                 # It is no loss: it did arrive.
                 self._note(arrival, refused, schema)
@@ -80,10 +79,3 @@ class Reader:
                 f"lost {arrival.key}", "messages lost", key=arrival.key, source=source, lost=lost
             )
         return lost is not None
-
-
-def _envelope_of(payload: bytes) -> Envelope | None:
-    try:
-        return Envelope.model_validate(msgpack.unpackb(payload, use_list=False))
-    except (ValueError, msgpack.UnpackException, RecursionError):
-        return None

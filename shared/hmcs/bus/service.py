@@ -4,10 +4,10 @@ A service is a class and one line, `raise SystemExit(run(TaskHmm))`. `run` waits
 constructs the service, starts it, answers `health`, `describe` and `settings` for it, announces its
 presence, and pumps the bus until SIGTERM or SIGINT.
 
-A handler that raises does not end the process: the traceback is logged, the failure counted, the
-loop goes on, and health says unhealthy until `UNHEALTHY_FOR_S` have passed without another one. A
-UserError is a mistake nobody but the user can mend: it ends the process with its message and exit
-code 2, wherever it is raised.
+Only starting can fail for good: a UserError there is a mistake of the user and ends the process
+with its message and exit code 2. Once it runs, a handler that raises does not end it: the failure
+is logged and counted, the loop goes on, and health says unhealthy until `UNHEALTHY_FOR_S` have
+passed without another one.
 """
 
 from __future__ import annotations
@@ -20,23 +20,35 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any, ClassVar
 
+from hmcs.bus.answering import LoopHangsError
 from hmcs.bus.keys import KeyNameError
 from hmcs.bus.logs import Seldom, open_log
 from hmcs.bus.messages import Ask, Description, Health, SettingsReport
+from hmcs.bus.rights import rights_of, roles
 from hmcs.bus.session import Bus, StoppedError
 from hmcs.bus.settings import ServiceSettings, as_yaml, load_settings
+from hmcs.bus.verbs import DESCRIBE, HEALTH, SETTINGS
 from hmcs.errors import UserError
 
-__all__ = ["Service", "ServiceSettings", "UserError", "run", "serve"]
+__all__ = ["CannotGoOnError", "Service", "ServiceSettings", "UserError", "run", "serve"]
 
 UNHEALTHY_FOR_S = 10.0
 """How long a failed handler makes a process unhealthy."""
+FAILURE_LETTERS = 500
+"""How much of a failure health tells: an error may quote whatever somebody sent."""
+SWITCH_S = 0.0005
+"""How long a thread may keep the interpreter from the others."""
 _PUMP_S = 0.5
 _RATE_WINDOW_S = 1.0
+
+
+class CannotGoOnError(Exception):
+    """A process has lost what it cannot do without: it ends with code 1, to be started anew."""
 
 
 class Service:
@@ -81,6 +93,8 @@ def run(service_type: type[Service], argv: Sequence[str] | None = None) -> int:
         # What libraries have loaded stays. Looking through all of it for garbage holds up every
         # thread at once, up to 0.2 s on a busy machine: a robot would stop for it.
         gc.freeze()
+        # What runs beside the loop gives way to it soon: the usual 5 ms at every turn add up.
+        sys.setswitchinterval(SWITCH_S)
         with _stop_on_signals() as stop:
             return _run(service_type, settings, log, stop)
     except (UserError, KeyNameError) as error:
@@ -98,6 +112,9 @@ def serve(
     stopping: Callable[[], bool],
 ) -> None:
     """Live as a service on an open bus until `stopping` (after it turns true, wake the bus)."""
+    name = service_type.name
+    if name in roles():
+        bus.rights = rights_of(name, bus.keys, bus.source.instance)
     service = service_type(settings, bus, log)
     life = _Life(service)
     try:
@@ -113,27 +130,28 @@ def serve(
     except StoppedError:
         pass
     finally:
+        life.close()
         service.close()
 
 
 class Stop:
-    """The wish that a process ends: set once, from a signal handler or another thread."""
+    """The request that a process ends: made once, from a signal handler or another thread."""
 
     def __init__(self) -> None:
         self._set = False
         self._wake: Callable[[], None] = lambda: None
 
     def __call__(self) -> bool:
-        """Return whether it is wished."""
+        """Return whether it was made."""
         return self._set
 
     def set(self) -> None:
-        """Wish it."""
+        """Request the stop and wake the bus."""
         self._set = True
         self._wake()
 
     def wakes(self, bus: Bus) -> None:
-        """Let the wish wake `bus`."""
+        """Wake `bus` with the request."""
         self._wake = bus.wake
 
 
@@ -164,6 +182,7 @@ class _Life:
         self._service = service
         self._bus = service.bus
         self._seldom = Seldom(service.log)
+        self._beside = ThreadPoolExecutor(2, thread_name_prefix="health")
         self._began_s = time.monotonic()
         self._failures = 0
         self._failed_s = -float("inf")
@@ -174,23 +193,31 @@ class _Life:
     def answer_questions(self) -> None:
         """Answer what every service answers."""
         self._bus.every(_RATE_WINDOW_S, self._measure_rate)
-        self._bus.answer("health", Ask, self._health)
-        self._bus.answer("describe", Ask, self._describe)
-        self._bus.answer("settings", Ask, self._settings)
+        HEALTH.answer(self._bus, self._health, aside=self._beside)
+        DESCRIBE.answer(self._bus, self._describe)
+        SETTINGS.answer(self._bus, self._settings)
 
     def pump(self) -> None:
         """Handle what is pending; outlive a handler that fails."""
         try:
             self._bus.pump(_PUMP_S)
-        except (StoppedError, UserError):
+        except (StoppedError, CannotGoOnError):
             raise
         except Exception as error:
             self._failures += 1
             self._failed_s = time.monotonic()
-            self._failure = f"{type(error).__name__}: {error}"
+            self._failure = f"{type(error).__name__}: {error}"[:FAILURE_LETTERS]
             self._seldom.warning(
-                self._failure, "a handler failed: going on", exc_info=True, failures=self._failures
+                type(error).__name__,
+                "a handler failed: going on",
+                exc_info=not isinstance(error, UserError),
+                reason=self._failure,
+                failures=self._failures,
             )
+
+    def close(self) -> None:
+        """Answer no more."""
+        self._beside.shutdown(wait=False, cancel_futures=True)
 
     def _measure_rate(self) -> None:
         then_s, then = self._counted
@@ -199,7 +226,11 @@ class _Life:
         self._counted = (now_s, now)
 
     def _health(self, _: Ask) -> Health:
-        healthy, detail = self._service.health()
+        # Beside the loop, so that one that hangs is told as well.
+        try:
+            healthy, detail = self._bus.in_loop(self._service.health)
+        except LoopHangsError as error:
+            healthy, detail = False, str(error)
         now_s = time.monotonic()
         if now_s - self._failed_s < UNHEALTHY_FOR_S:
             healthy = False

@@ -1,8 +1,9 @@
 """Zenoh behind typed messages: open, publish, subscribe, ask, answer, presence.
 
 Whatever arrives on Zenoh's threads is only put into a mailbox. Decoding, counting, refusing and
-every handler run in the one thread that calls `Bus.pump`, so a service needs no locks. Only answers
-that take their time are made aside, where that is asked for.
+every handler run in the one thread that calls `Bus.pump`, so a service needs no locks. Questions
+are decoded and answers encoded on a thread of their own; only the handler between the two runs in
+the loop, or aside as well where an answer takes its time.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import itertools
 import logging
 import secrets
 import time
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Executor
 from types import TracebackType
@@ -19,23 +20,27 @@ from typing import Generic, Self, TypeVar
 
 import zenoh
 
+from hmcs.bus.answering import Answering
+from hmcs.bus.bounds import BOUNDS, LARGEST_PUBLISHED_BYTES
 from hmcs.bus.config import BusSettings
 from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
 from hmcs.bus.counters import Counters
-from hmcs.bus.keys import Keys, check_name
+from hmcs.bus.keys import ANY, PREFIX, Keys, check_name, is_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.loop import Loop
-from hmcs.bus.mailbox import Arrival, EveryOne, Mailbox, NewestWins
+from hmcs.bus.mailbox import Arrival, EveryOne, Listening, Mailbox, NewestWins
 from hmcs.bus.messages import Envelope, Message, Origin, Source
 from hmcs.bus.qos import STANCES, Stance
 from hmcs.bus.questions import (
     Answer,
     RequestRefusedError,
     read_answers,
+    refuse_busy,
     replies_until_done,
     reply,
 )
 from hmcs.bus.reading import Reader, Received
+from hmcs.bus.rights import Rights, check_right
 from hmcs.bus.timers import NS_PER_S, Timer, Timers
 from hmcs.bus.wire import encode
 
@@ -52,11 +57,12 @@ __all__ = [
     "Token",
 ]
 
-LISTENING_BOUND = 50_000
-"""Messages a listener may have waiting; more are lost, and so counted."""
+TOKENS_BOUND = 4096
+"""Tokens that one watch follows: a cell has a few dozen processes, each with a handful."""
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
+R = TypeVar("R")
 T = TypeVar("T")
 
 
@@ -144,6 +150,8 @@ class Bus:
         self.keys = Keys(settings.cell)
         self.source = Source(service=service, instance=instance, boot=secrets.token_hex(6))
         self.counters = Counters()
+        self.rights: Rights | None = None
+        """What may be declared on it; None refuses nothing."""
         self.publishes: list[str] = []
         self.subscribes: list[str] = []
         self.answers: list[str] = []
@@ -155,6 +163,7 @@ class Bus:
         self._mailbox = Mailbox()
         self._timers = Timers()
         self._loop = Loop(self._mailbox, self._timers, self.counters, stopping)
+        self._answering = Answering(self._mailbox, stopping)
         self._numbers: defaultdict[str, itertools.count[int]] = defaultdict(itertools.count)
         # Zenoh undeclares what nobody holds.
         self._declared: list[object] = []
@@ -182,6 +191,7 @@ class Bus:
 
     def close(self) -> None:
         """Leave the bus; a second time does nothing."""
+        self._answering.close()
         if not self._session.is_closed():
             self._session.close()  # type: ignore[no-untyped-call]
 
@@ -197,8 +207,14 @@ class Bus:
     # --- publish and subscribe --------------------------------------------------------------------
 
     def publisher(self, message_type: type[M], key: str) -> Publisher[M]:
-        """Return a publisher of `message_type` on `key`, with the stance of the table in `qos`."""
+        """Return a publisher of `message_type` on `key`, with the stance of the table in `qos`.
+
+        A last chunk that stands for any instance becomes this process' own.
+        """
+        if key.endswith(f"/{ANY}"):
+            key = key.removesuffix(ANY) + self.source.instance
         stance = _stance(message_type)
+        check_right(self.rights, "says", key)
         publisher = self._session.declare_publisher(
             key,
             priority=getattr(zenoh.Priority, stance.priority.upper()),
@@ -218,6 +234,7 @@ class Bus:
         What is no message of `message_type` is refused, counted and logged.
         """
         newest_wins = _stance(message_type).delivery == "newest_wins"
+        check_right(self.rights, "hears", key)
         # Each subscription follows sequence numbers by itself: it sees every message anew.
         reader = Reader(self.counters, self._seldom)
 
@@ -226,16 +243,13 @@ class Bus:
             if received is not None:
                 handler(received)
 
-        box = (
-            NewestWins(self._mailbox, handle)
-            if newest_wins
-            else EveryOne(self._mailbox, handle, lambda: reader.overflowed(key))
+        box = (NewestWins if newest_wins else EveryOne)(
+            self._mailbox, handle, lambda: reader.overflowed(key)
         )
+        largest_bytes = BOUNDS[message_type].size_bytes
 
         def arrive(sample: zenoh.Sample) -> None:
-            now_ns = time.monotonic_ns()
-            sender = sample.attachment.to_bytes() if sample.attachment is not None else b""
-            box.arrive(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns, sender))
+            box.arrive(_arrival(sample, largest_bytes))
 
         self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
         self.subscribes.append(key)
@@ -247,21 +261,13 @@ class Bus:
         together, every `every_s`, which costs a fraction of waking up for each. What finds no
         place to wait is told by the gap in its numbers, as all losses are.
         """
-        waiting: deque[Arrival] = deque()
+        check_right(self.rights, "hears", key)
+        listening = Listening(handler, lambda: self._reader.overflowed(key))
 
         def arrive(sample: zenoh.Sample) -> None:
-            now_ns = time.monotonic_ns()
-            if len(waiting) < LISTENING_BOUND:
-                waiting.append(Arrival(str(sample.key_expr), sample.payload.to_bytes(), now_ns))
+            listening.arrive(_arrival(sample, LARGEST_PUBLISHED_BYTES))
 
-        def hand_on() -> None:
-            if len(waiting) >= LISTENING_BOUND:
-                self._reader.overflowed(key)
-            for _ in range(len(waiting)):
-                handler(waiting.popleft())
-
-        self.every(every_s, hand_on)
-
+        self.every(every_s, listening.hand_on)
         self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
         self.subscribes.append(key)
 
@@ -277,26 +283,35 @@ class Bus:
     ) -> None:
         """Answer questions of `question_type` on this process' key of `verb`.
 
-        An answer that takes long is made `aside`, on threads of its own, and holds nobody up; its
-        handler may touch nothing that others change. Where `handler` raises RequestRefusedError or
-        UserError the asker gets a Refusal with its message; any other exception refuses as well and
-        then leaves `pump`.
+        Questions are decoded and answers encoded beside the loop; `handler` runs in the loop. An
+        answer that takes long is made `aside`, on threads of its own, handler and all: what of it
+        needs the loop's own state is done with `in_loop`. Where `handler` raises
+        RequestRefusedError or UserError the asker gets a Refusal with its message; any other
+        exception refuses as well and then leaves `pump`.
         """
         key = self.keys.rpc(self.source.service, self.source.instance, verb)
+        check_right(self.rights, "answers", key)
         stamps = self._stamps(key)
+
+        def handled(question: Q) -> Message:
+            return handler(question) if aside else self.in_loop(lambda: handler(question))
 
         def arrive(query: zenoh.Query) -> None:
             def work() -> None:
-                reply(query, key, question_type, handler, self._reader, stamps)
+                reply(query, key, question_type, handled, self._reader, stamps)
 
-            if aside is None:
-                self._mailbox.put(work)
-            else:
-                # What went wrong leaves `pump` as it does elsewhere.
-                aside.submit(work).add_done_callback(lambda done: self._mailbox.put(done.result))
+            if not self._answering.submit(work, aside):
+                refuse_busy(query, key, stamps)
 
         self._declared.append(self._session.declare_queryable(key, _on_thread(arrive)))
         self.answers.append(key)
+
+    def in_loop(self, work: Callable[[], R]) -> R:
+        """Do `work` in the thread that pumps and return what it gave, or raise what it raised.
+
+        For handlers that answer aside. Raises LoopHangsError where the loop does not come round.
+        """
+        return self._answering.in_loop(work)
 
     def ask(
         self, key: str, question: Message, answer_type: type[M], timeout_s: float = 1.0
@@ -308,6 +323,7 @@ class Bus:
         Raises RequestRefusedError where `key` names one process and that refused, and StoppedError
         where the process is told to stop meanwhile.
         """
+        check_right(self.rights, "asks", key)
         payload = encode(question, self._stamps(key)())
 
         def get(handler: zenoh.handlers.Callback[zenoh.Reply]) -> None:
@@ -328,6 +344,7 @@ class Bus:
 
     def announce(self, key: str) -> Token:
         """Show `key` to everybody who watches, until it is withdrawn or this process is gone."""
+        check_right(self.rights, "announces", key)
         token = Token(self._session.liveliness().declare_token(key))
         self._declared.append(token)
         return token
@@ -335,14 +352,20 @@ class Bus:
     def watch(self, key: str, handler: Callable[[str, bool], None]) -> None:
         """Call `handler` with each token's key as it comes (True) or goes (False).
 
-        Those already there come first. A token that is only confirmed is not told again.
+        Those already there come first. A token that is only confirmed is not told again; one that
+        holds what is no name is refused and counted.
         """
+        check_right(self.rights, "watches", key)
         living: set[str] = set()
 
         def change(token: str, alive: bool) -> None:
-            if alive != (token in living):
-                (living.add if alive else living.discard)(token)
-                handler(token, alive)
+            if not self._is_token(token) or alive == (token in living):
+                return
+            if alive and len(living) >= TOKENS_BOUND:
+                self._seldom.warning("tokens", "too many tokens: one more is left out", token=token)
+                return
+            (living.add if alive else living.discard)(token)
+            handler(token, alive)
 
         def arrive(sample: zenoh.Sample) -> None:
             token, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
@@ -353,12 +376,25 @@ class Bus:
         )
 
     def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
-        """Return the keys of the tokens on `key` that are there now, sorted."""
+        """Return the keys of the tokens on `key` that are there now, sorted.
+
+        Those that hold what is no name are left out and counted.
+        """
+        check_right(self.rights, "watches", key)
         samples = replies_until_done(
             lambda handler: self._session.liveliness().get(key, handler, timeout=timeout_s),
             self._stopping,
         )
-        return sorted({str(sample.key_expr) for sample in samples})
+        tokens = {str(sample.key_expr) for sample in samples[:TOKENS_BOUND]}
+        return sorted(token for token in tokens if self._is_token(token))
+
+    def _is_token(self, token: str) -> bool:
+        chunks = token.removeprefix(f"{PREFIX}/").split("/")
+        if all(is_name(chunk) for chunk in chunks):
+            return True
+        self.counters.count_refused("presence", token)
+        self._seldom.warning("token", "presence under what is no name: refused", token=token)
+        return False
 
     # --- the loop ---------------------------------------------------------------------------------
 
@@ -373,12 +409,17 @@ class Bus:
         """Call `handler` once, when the local monotonic clock reaches `monotonic_ns`."""
         return self._timers.add(monotonic_ns, Timer(handler, None))
 
+    def soon(self, work: Callable[[], None]) -> None:
+        """Do `work` in the thread that pumps, in its turn; from any thread."""
+        self._mailbox.put(work)
+
     def pump(self, timeout_s: float) -> int:
         """Handle what is pending, in order of arrival, and timers when they are due.
 
         Waits at most `timeout_s` for something to do; returns how many things were handled. An
         exception of a handler leaves `pump`; whatever else is pending stays for the next call.
         """
+        self._answering.note_loop()
         return self._loop.pump(timeout_s)
 
     def wake(self) -> None:
@@ -412,6 +453,19 @@ def _stance(message_type: type[Message]) -> Stance:
             f"{message_type.__name__} is not published: it has no stance in hmcs.bus.qos "
             f"(those that have: {', '.join(sorted(m.__name__ for m in STANCES))})"
         ) from None
+
+
+def _arrival(sample: zenoh.Sample, largest_bytes: int) -> Arrival:
+    """Return a sample as it arrived; of one that is too large its size alone.
+
+    To copy it would hold up every thread of the process.
+    """
+    now_ns = time.monotonic_ns()
+    payload, attachment = sample.payload, sample.attachment
+    size = len(payload)
+    sender = attachment.to_bytes() if attachment is not None and len(attachment) <= 64 else b""
+    data = payload.to_bytes() if size <= largest_bytes else b""
+    return Arrival(str(sample.key_expr), data, now_ns, sender, size_bytes=size)
 
 
 def _on_thread(callback: Callable[[T], None]) -> zenoh.handlers.Callback[T]:

@@ -21,14 +21,14 @@ from hmcs.bus.messages import (
     RobotState,
     Step,
 )
+from hmcs.controller_feed import ControllerFeed
 from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.driver import Driver
 from hmcs.fixtures.exchanged import Fixture
 from hmcs.fixtures.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
 from hmcs.recordings.replaying import Replay, recognizer_named, settings_in
 from hmcs.recordings.ticks import Did, Tick, Ticks
-from hmcs.translation import guides_of, sample_of, segment_belief_of
+from hmcs.translation import guides_of
 
 HEARD = (Motion, Step, Belief, RobotState, FixtureState)
 CONTROLLER = "fixture_controller/"
@@ -103,20 +103,18 @@ class _Again:
         model = replay.model
         self.ticks = Ticks()
         self.lost = self.refused = self.robots = 0
-        self._controller = Controller(safeguards)
-        self._controller.load(model.name, guides_of(model))
+        controller = Controller(safeguards)
+        controller.load(model.name, guides_of(model))
         if active:
-            self._controller.activate(model.name)
+            controller.activate(model.name)
+        self._feed = ControllerFeed(controller)
         self._name, self._recorded_name = model.name, replay.compared_with
-        self._driver = Driver(safeguards.input_stale_after_s)
         self._sequences = Sequences()
-        self._clock, self._next_step = "", 0
         self._replayed = replay.beliefs
         self._numbers = {
             (each.clock, each.step): number for number, each in enumerate(replay.beliefs)
         }
         """Of each step among those that were replayed."""
-        self._last_believed = ("", -1)
 
     def hear(self, now_s: float, recorded: Recorded, envelope: Envelope, message: Message) -> None:
         """Take in a recorded message at its time."""
@@ -127,52 +125,42 @@ class _Again:
                 self._stepped(now_s, envelope, message)
             case RobotState():
                 self.robots += 1
-                place, turned = message.tool_position, message.tool_orientation
-                self._controller.robot_moved(now_s, place, turned)
+                self._feed.on_robot(now_s, envelope.source, message, ())
             case Belief() if recognizer_named(recorded.key) == self._recorded_name:
                 self._believed(message.clock, message.step)
 
     def _sampled(
         self, now_s: float, recorded: Recorded, envelope: Envelope, motion: Motion
     ) -> None:
-        boot, number = envelope.source.boot, envelope.seq
-        self.lost += self._sequences.note(recorded.key, boot, number) or 0
-        if self._driver.heard(now_s, boot, number) != "accepted":
+        source, number = envelope.source, envelope.seq
+        lost = self._sequences.note(recorded.key, source.boot, number)
+        self.lost += lost or 0
+        made = None
+        if lost is not None:
+            made = self._feed.on_motion(now_s, source, number, motion, envelope.origin)
+        if made is None:
             self.refused += 1
             return
-        self._follow(boot)
-        made = self._controller.sampled(now_s, sample_of(motion, number, envelope.origin))
-        self.ticks.add(recorded.log_ns, boot, number, _would_do(made))
+        self.ticks.add(recorded.log_ns, source.boot, number, _would_do(made))
 
     def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
         """Take a step, and the belief after it where none was recorded that says when it came."""
-        boot = envelope.source.boot
-        if boot != self._clock and self._clock and not self._driver.admits(now_s, boot):
+        source = envelope.source
+        if self._feed.on_step(now_s, source, step, envelope.origin) != "taken":
             return
-        self._follow(boot)
-        if step.index < self._next_step:
-            return
-        self._next_step = step.index + 1
-        number = None if envelope.origin is None else envelope.origin.seq
-        self._controller.stepped(now_s, step.index, step.position, step.displacement, number)
-        replayed = self._numbers.get((boot, step.index))
+        replayed = self._numbers.get((source.boot, step.index))
         if replayed is not None and self._replayed[replayed].recorded is None:
-            self._believed(boot, step.index)
+            self._believed(source.boot, step.index)
 
     def _believed(self, clock: str, step: int) -> None:
-        """Take the replayed belief of a step, once: of several recognizers the first counts."""
+        """Take the replayed belief of a step; of several recognizers the first counts."""
         number = self._numbers.get((clock, step))
-        if number is None or clock != self._clock or (clock, step) == self._last_believed:
+        if number is None:
             return
-        self._last_believed = (clock, step)
-        self._controller.believed(self._name, segment_belief_of(self._replayed[number].replayed))
-        if not self._controller.active:
-            self._controller.activate(self._name)
-
-    def _follow(self, boot: str) -> None:
-        if boot != self._clock:
-            self._clock, self._next_step = boot, 0
-            self._controller.forget()
+        verdict = self._feed.on_belief(self._name, self._replayed[number].replayed)
+        controller = self._feed.controller
+        if verdict in ("taken", "early") and not controller.active:
+            controller.activate(self._name)
 
 
 def _notes(

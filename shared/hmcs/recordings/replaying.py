@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, cast, get_args
 
+from hmcs.bus.keys import KeyNameError, recognizer_in
 from hmcs.bus.messages import Belief, Evidence, Step
 from hmcs.bus.wire import schema_of
 from hmcs.errors import UserError
@@ -201,11 +202,10 @@ def recognizer_named(key: str) -> str:
 
     Of `…/model/NAME/belief` as of `…/model/NAME/belief/INSTANCE`; empty for any other key.
     """
-    chunks = key.split("/")
-    for at in range(len(chunks) - 2):
-        if (chunks[at], chunks[at + 2]) == ("model", "belief"):
-            return chunks[at + 1]
-    return ""
+    try:
+        return recognizer_in(key).model
+    except KeyNameError:
+        return ""
 
 
 def settings_in(facts: Mapping[str, str]) -> Mapping[str, Any] | None:

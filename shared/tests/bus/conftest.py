@@ -12,24 +12,26 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 
 
 @pytest.fixture
-def until() -> Callable[[Callable[[], object]], None]:
-    """Wait for a condition, with a deadline."""
+def until() -> Callable[[Callable[[], Any]], Any]:
+    """Wait for a condition, with a deadline, and return what it gave."""
 
-    def wait(condition: Callable[[], object]) -> None:
+    def wait(condition: Callable[[], Any]) -> Any:
         deadline_s = time.monotonic() + DEADLINE_S
-        while not condition():
+        while not (value := condition()):
             assert time.monotonic() < deadline_s, "the condition did not come true in time"
             time.sleep(0.005)
+        return value
 
     return wait
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.bus.mailbox import Arrival, EveryOne, Mailbox, NewestWins
+from hmcs.bus.mailbox import SENDER_SHARE, Arrival, EveryOne, Mailbox, NewestWins
 
 
 def drain(mailbox: Mailbox) -> None:
@@ -43,23 +43,61 @@ def test_newest_wins_hands_on_the_newest_of_each_key_and_accounts_for_the_rest(k
     assert sum(1 + arrival.overwritten for arrival in got) == handed_in
 
 
-@given(st.integers(1, 5), st.integers(0, 12))
-def test_every_one_is_bounded_and_says_once_that_it_overflows(bound, count) -> None:
+@given(st.integers(1, 5), st.integers(0, 40))
+def test_every_one_is_bounded_and_says_once_that_it_overflows(share, count) -> None:
     mailbox, got, overflows = Mailbox(), [], []
+    bound = share * SENDER_SHARE
     box = EveryOne(mailbox, got.append, lambda: overflows.append(len(got)), bound=bound)
     for arrival in arrivals(["a"] * count):
         box.arrive(arrival)
     drain(mailbox)
-    assert got == arrivals(["a"] * count)[:bound]
-    assert len(overflows) == (count > bound)
+    assert got == arrivals(["a"] * count)[:share]
+    assert len(overflows) == (count > share)
+
+
+def test_the_flood_of_one_sender_leaves_room_for_another() -> None:
+    mailbox, got = Mailbox(), []
+    box = EveryOne(mailbox, got.append, lambda: None, bound=8)
+    for number in range(100):
+        box.arrive(Arrival("a", b"", number, b"flood"))
+    honest = Arrival("a", b"", 100, b"honest")
+    box.arrive(honest)
+    drain(mailbox)
+    assert honest in got
+    assert len(got) == 3
+
+
+def test_messages_that_wait_are_bounded_in_bytes_too_and_once_handled_make_room() -> None:
+    mailbox, got = Mailbox(), []
+    box = EveryOne(mailbox, got.append, lambda: None, bound_bytes=400)
+    for _ in range(3):
+        for number in range(100):
+            box.arrive(Arrival("a", bytes(30), number))
+        drain(mailbox)
+    assert [arrival.received_ns for arrival in got] == [0, 1, 2] * 3
+
+
+def test_newest_wins_keeps_of_so_many_senders_and_says_once_that_it_overflows() -> None:
+    mailbox, got, overflows = Mailbox(), [], []
+    box = NewestWins(mailbox, got.append, lambda: overflows.append(1), most_senders=3)
+    for number in range(10):
+        box.arrive(Arrival("a", b"", number, str(number).encode()))
+    box.arrive(Arrival("a", b"", 10, b"0"))
+    drain(mailbox)
+    assert [arrival.sender for arrival in got] == [b"0", b"1", b"2"]
+    assert got[0].received_ns == 10
+    assert overflows == [1]
+    box.arrive(Arrival("a", b"", 11, b"9"))
+    drain(mailbox)
+    assert got[-1].received_ns == 11
 
 
 def test_after_an_overflow_there_is_room_again() -> None:
     mailbox, got = Mailbox(), []
     box = EveryOne(mailbox, got.append, lambda: None, bound=1)
     for _ in range(2):
-        box.arrive(Arrival("a", b"", 0))
-        box.arrive(Arrival("a", b"", 0))
+        for _ in range(2):
+            box.arrive(Arrival("a", b"", 0))
         drain(mailbox)
     assert len(got) == 2
 

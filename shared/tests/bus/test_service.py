@@ -15,6 +15,7 @@ from hmcs.bus import health
 from hmcs.bus.messages import Ask, Description, Health, SettingsReport, Step
 from hmcs.bus.service import Service, ServiceSettings, Stop, run, serve
 from hmcs.bus.session import Bus, BusSettings
+from hmcs.bus.verbs import DESCRIBE, HEALTH
 
 PROBE = """
 import sys, time
@@ -109,14 +110,70 @@ def test_a_handler_that_fails_is_logged_and_the_loop_goes_on_unhealthy(
     assert "RuntimeError: boom" in capsys.readouterr().out
 
 
-def test_a_mistake_of_the_user_ends_it_with_code_2_and_one_line(probe, join, until) -> None:
+def test_a_mistake_of_the_user_met_while_it_runs_is_a_failed_handler_told_in_one_line(
+    probe, join, until
+) -> None:
     bus = join()
     steps = bus.publisher(Step, bus.keys.step)
     until(lambda: steps.matching)
-    steps.put(step(13))
-    assert probe.wait(5) == 2
-    assert "probe: step 13: count without it" in probe.log.read_text().splitlines()
+    for index in (13, 14):
+        steps.put(step(index))
+    until(lambda: "step" in events(probe))
+    assert "step 13: count without it" in probe.log.read_text()
     assert "Traceback" not in probe.log.read_text()
+    assert probe.poll() is None
+
+
+def test_a_mistake_of_the_user_met_while_it_starts_ends_it_with_code_2_and_one_line(
+    spawn, router
+) -> None:
+    subscribes = "bus.subscribe(Step, bus.keys.step, self.on_step)"
+    broken = PROBE.replace(subscribes, 'raise UserError("no model: name one")')
+    process = spawn(broken, "--router", router)
+    assert process.wait(30) == 2
+    assert "probe: no model: name one" in process.log.read_text().splitlines()
+
+
+def test_a_timer_slower_than_its_period_leaves_a_service_answering_and_ending(
+    spawn, router, join, until
+) -> None:
+    slow = PROBE.replace(
+        "bus.subscribe(Step, bus.keys.step, self.on_step)",
+        "bus.every(0.004, lambda: time.sleep(0.006))",
+    )
+    process = spawn(slow, "--router", router, "--cell", "test", "--instance", "p")
+    until(lambda: "ready" in events(process))
+    bus = join()
+    until(lambda: DESCRIBE.ask(bus, Ask(), service="probe", timeout_s=10.0))
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(30) == 0
+
+
+def test_a_service_whose_loop_hangs_still_says_so_itself(spawn, router, join, until) -> None:
+    hung = PROBE.replace('raise RuntimeError("boom")', "time.sleep(600)")
+    process = spawn(hung, "--router", router, "--cell", "test", "--instance", "p")
+    until(lambda: "ready" in events(process))
+    bus = join()
+    steps = bus.publisher(Step, bus.keys.step)
+    until(lambda: steps.matching)
+    steps.put(step(7))
+    (answer,) = until(lambda: HEALTH.ask(bus, Ask(), service="probe", timeout_s=20.0))
+    assert not answer.body.healthy
+    assert "has not come round" in answer.body.detail
+    process.kill()
+
+
+def test_a_service_of_the_table_declares_nothing_that_the_table_does_not_give_it(
+    spawn, router
+) -> None:
+    trespassing = PROBE.replace('name = "probe"', 'name = "task_hmm"')
+    process = spawn(
+        trespassing.replace("bus.subscribe(Step, bus.keys.step, self.on_step)",
+            "from hmcs.bus.messages import Command; bus.publisher(Command, bus.keys.command)"),
+        "--router", router,
+    )  # fmt: skip
+    assert process.wait(30) == 1
+    assert "the table of rights" in process.log.read_text()
 
 
 def step(index: int) -> Step:

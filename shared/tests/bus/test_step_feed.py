@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections import Counter
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -14,9 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmcs.bus.keys import Keys
-from hmcs.bus.messages import Envelope, LastSteps, LastStepsQuestion, Origin, Source, Step
+from hmcs.bus.messages import Envelope, LastSteps, LastStepsQuestion, Origin, Pairing, Source, Step
 from hmcs.bus.session import Answer, Received
-from hmcs.bus.step_feed import TAKEOVER_S, StepFeed
+from hmcs.bus.step_feed import LARGEST_JUMP, PAIRING_FRESH_S, StepFeed
+from hmcs.driving import TAKEOVER_S
 
 MOVE = np.array([0.01, 0.0, 0.0])
 S = 1_000_000_000
@@ -32,22 +34,24 @@ class FakeBus:
     def __init__(self, kept: range = range(0), boot: str = "boot-1") -> None:
         self.keys = Keys("cell")
         self.kept, self.boot, self.questions = kept, boot, []
+        self.hangs = False
         self.refused: Counter[str] = Counter()
         self.counters = SimpleNamespace(count_refused=self._count_refused)
-        self.heard: Callable[[Received[Step]], None] = lambda _: None
-        self.now_ns = 0
+        self.handlers: dict[str, Callable[[Received[Any]], None]] = {}
+        self.now_ns = time.monotonic_ns()
 
     def _count_refused(self, schema: str, reason: str) -> None:
         self.refused[schema] += 1
 
-    def subscribe(self, _type: Any, key: str, handler: Callable[[Received[Step]], None]) -> None:
-        assert key == self.keys.step
-        self.heard = handler
+    def subscribe(self, _type: Any, key: str, handler: Callable[[Received[Any]], None]) -> None:
+        self.handlers[key] = handler
 
     def ask(
         self, key: str, question: LastStepsQuestion, _type: Any, timeout_s: float
     ) -> list[Answer[LastSteps]]:
         self.questions.append(question)
+        if self.hangs:
+            return []
         indices = [i for i in self.kept if question.before is None or i < question.before]
         chosen = indices[-question.count :]
         origin = Origin(boot=self.boot, seq=0, captured_ns=0)
@@ -63,7 +67,17 @@ class FakeBus:
 
     def hear(self, index: int, instance: str = "a", boot: str | None = None) -> None:
         envelope = Envelope(source=self.source(instance, boot), seq=index)
-        self.heard(Received(step(index), envelope, self.now_ns, self.keys.step))
+        key = self.keys.step
+        self.handlers[key](Received(step(index), envelope, self.now_ns, key))
+
+    def pair(self, device: str, instance: str = "a") -> None:
+        source = Source(service="fixture_controller", instance="f", boot="boot-f")
+        body = Pairing(device=device, device_instance=instance, robot="", robot_instance="")
+        key = self.keys.pairing
+        self.handlers[key](Received(body, Envelope(source=source, seq=0), self.now_ns, key))
+
+    def wait(self, seconds: float) -> None:
+        self.now_ns += round(seconds * S)
 
 
 class Listener:
@@ -155,6 +169,7 @@ def test_an_input_device_that_starts_anew_starts_the_listener_anew() -> None:
     bus.hear(0)
     bus.hear(1)
     bus.boot = "boot-2"
+    bus.wait(TAKEOVER_S + 0.1)
     bus.hear(0)
     assert listener.told[-2:] == [("restart", 0), ("step", 0)]
     assert listener.clocks == ["boot-1", "boot-1", "boot-2"]
@@ -167,9 +182,98 @@ def test_a_second_input_device_is_refused_while_the_first_is_alive_and_heard_aft
     bus.hear(0, instance="b", boot="other")
     assert bus.refused["step"] == 1
     assert listener.steps == [0]
-    bus.now_ns = round((TAKEOVER_S + 0.1) * S)
+    bus.wait(TAKEOVER_S + 0.1)
     bus.hear(0, instance="b", boot="other")
     assert listener.clocks == ["boot-1", "other"]
+
+
+def test_a_stray_step_right_after_catching_up_takes_nothing_over() -> None:
+    bus = FakeBus(kept=range(50))
+    listener = Listener(bus)
+    bus.hear(0, instance="b", boot="other")
+    bus.hear(0, instance="a", boot="the same name, another boot")
+    bus.hear(50)
+    assert listener.steps == [*range(45, 51)]
+    assert set(listener.clocks) == {"boot-1"}
+    assert bus.refused["step"] == 2
+
+
+def test_the_device_of_the_pairing_is_the_one_that_is_followed() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.pair("boot-1")
+    bus.hear(0)
+    bus.wait(10 * TAKEOVER_S)
+    bus.pair("boot-1")
+    bus.hear(0, instance="b", boot="other")
+    assert bus.refused["step"] == 1
+    bus.hear(1)
+    assert listener.steps == [0, 1]
+
+
+def test_a_pairing_with_another_device_begins_anew_with_the_last_steps_of_that() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.kept, bus.boot = range(7), "boot-b"
+    bus.pair("boot-b", "b")
+    assert listener.told[-6:] == [("restart", 2), *(("step", k) for k in range(2, 7))]
+    bus.hear(1, boot="boot-1")
+    bus.hear(7, instance="b", boot="boot-b")
+    assert listener.steps == [0, *range(2, 8)]
+    assert listener.clocks == ["boot-1"] + ["boot-b"] * 6
+
+
+def test_a_pairing_that_is_not_heard_again_says_nothing_any_more() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.pair("boot-1")
+    bus.hear(0)
+    bus.wait(PAIRING_FRESH_S + TAKEOVER_S)
+    bus.hear(0, instance="b", boot="other")
+    assert listener.clocks == ["boot-1", "other"]
+
+
+def test_a_step_that_its_device_does_not_know_is_refused_and_those_after_it_are_not() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    for index in range(3):
+        bus.kept = range(index + 1)
+        bus.hear(index)
+    bus.hear(10**9)
+    assert bus.refused["step"] == 1
+    bus.kept = range(4)
+    bus.hear(3)
+    assert listener.steps == [0, 1, 2, 3]
+
+
+def test_where_the_device_does_not_answer_only_a_jump_that_can_be_is_taken_over() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.hangs = True
+    bus.hear(LARGEST_JUMP + 2)
+    assert listener.steps == [0]
+    bus.hear(9)
+    assert listener.told[-2:] == [("restart", 9), ("step", 9)]
+
+
+def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.hear(0)
+    bus.hangs = True
+    bus.hear(5000)
+    bus.hangs = False
+    for index in range(1, 4):
+        bus.kept = range(index + 1)
+        bus.hear(index)
+    bus.wait(2.0)
+    bus.kept = range(5)
+    bus.hear(4)
+    assert listener.told[-5:] == [("step", k) for k in range(5)][-5:]
+    bus.hear(5)
+    assert listener.steps[-1] == 5
 
 
 @given(

@@ -1,0 +1,185 @@
+"""A controller gets what one device, its recognizers and one robot say, whatever else is said."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmcs.bus.messages import Belief, Motion, Origin, RobotState, Source, Step
+from hmcs.controller_feed import EARLY_WITHIN, ControllerFeed
+from hmcs.driving import TAKEOVER_S
+from hmcs.fixtures.controller import Controller
+from hmcs.fixtures.exchanged import Fixture, Guides
+from hmcs.fixtures.rules import Rules, Safeguards
+from hmcs.motion.paths import Path
+
+PATH = Path(np.array([[0.0, 0, 0], [1.0, 0, 0]]))
+
+
+def source(boot: str, service: str = "input_device") -> Source:
+    return Source(service=service, instance=boot, boot=boot)
+
+
+class Scene:
+    """Devices at 100 Hz at the feed of a controller that follows the recognizer `m`."""
+
+    def __init__(self) -> None:
+        controller = Controller(Safeguards())
+        controller.load("m", Guides({"g": PATH}, Rules(compliance="belief")))
+        controller.activate("m")
+        self.feed, self.now_s, self.seq, self.step = ControllerFeed(controller), 100.0, 0, 0
+
+    def sample(self, boot: str, pressed: bool, speed: float = 0.1) -> Fixture | None:
+        self.now_s += 0.01
+        self.seq += 1
+        motion = Motion(
+            position=np.array([0.001 * self.seq, 0, 0]),
+            velocity=np.array([speed, 0, 0]),
+            dead_man=pressed,
+        )
+        return self.feed.on_motion(self.now_s, source(boot), self.seq, motion, None)
+
+    def samples(self, count: int, **pressed: bool) -> Fixture | None:
+        made = None
+        for _ in range(count):
+            for boot, down in pressed.items():
+                made = self.sample(boot, down) or made
+        return made
+
+    def make_step(self, boot: str, index: int) -> str:
+        move = np.array([0.01, 0, 0])
+        step = Step(index=index, position=min(index, 999) * move, displacement=move)
+        origin = Origin(boot=boot, seq=self.seq, captured_ns=0)
+        return self.feed.on_step(self.now_s, source(boot), step, origin)
+
+    def believe(self, step: int, clock: str = "a", **said: Any) -> str:
+        fields: dict[str, Any] = {
+            "model_hash": "h", "clock": clock, "step": step, "states": ("s",),
+            "probabilities": np.array([1.0]), "likely_gesteme": "g", "segment_start": 0,
+        }  # fmt: skip
+        return self.feed.on_belief("m", Belief(**(fields | said)))
+
+    def guide(self, count: int) -> Fixture | None:
+        """Move `a` on, each sample a step with its belief."""
+        made = None
+        for _ in range(count):
+            made = self.sample("a", True)
+            self.make_step("a", self.step)
+            self.believe(self.step)
+            self.step += 1
+        return made
+
+
+def test_a_deliberate_press_of_an_idle_devices_neighbor_drives_at_once() -> None:
+    scene = Scene()
+    scene.samples(80, a=False, b=False)
+    made = scene.samples(2, a=False, b=True)
+    assert made is not None
+    assert made.engaged
+    assert scene.feed.clock == "b"
+
+
+def test_a_device_that_takes_over_from_a_silent_one_drives_only_after_letting_go() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.samples(10, a=True)
+    made = scene.samples(round(TAKEOVER_S * 100) + 20, b=True)
+    assert made is not None
+    assert not made.engaged
+    scene.samples(40, b=False)
+    assert scene.samples(2, b=True).engaged
+
+
+def test_steps_of_another_device_than_the_one_that_drives_are_no_steps() -> None:
+    scene = Scene()
+    scene.samples(10, a=True)
+    assert scene.make_step("a", 0) == "taken"
+    assert scene.make_step("b", 0) == "second"
+    assert scene.believe(0, clock="b") == "other_clock"
+
+
+def test_the_steps_of_a_new_device_begin_anew() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.make_step("a", 7)
+    scene.samples(60, b=False)
+    assert scene.make_step("b", 0) == "taken"
+    assert scene.believe(7) == "other_clock"
+    assert scene.believe(0, clock="b") == "taken"
+
+
+def test_a_belief_that_overtook_its_step_counts_once_the_step_is_there() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(40)
+    assert scene.believe(scene.step) == "early"
+    scene.make_step("a", scene.step)
+    assert scene.believe(scene.step) == "old"
+
+
+@given(st.integers(0, 2**53))
+def test_one_forged_belief_keeps_no_later_one_out(step: int) -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(5)
+    scene.believe(step, states=("elsewhere",))
+    scene.make_step("a", scene.step)
+    scene.step += 1
+    scene.guide(3)
+    assert scene.believe(scene.step - 1) == "old"
+    assert scene.feed.controller._beliefs["m"].state == "s"
+
+
+@given(st.integers(0, 2**53))
+def test_one_forged_step_keeps_no_later_one_out_nor_its_belief(index: int) -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(5)
+    scene.make_step("a", index)
+    verdicts = [scene.make_step("a", 5 + k) for k in range(20)]
+    assert verdicts.count("old") <= (5 <= index < 25)
+    assert scene.believe(24) == "taken"
+
+
+def test_a_belief_far_ahead_of_all_steps_is_no_belief() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(3)
+    assert scene.believe(3 + EARLY_WITHIN) == "old"
+
+
+# --- robots ---------------------------------------------------------------------------------------
+
+
+def robot_at(x: float) -> RobotState:
+    return RobotState(
+        robot="puma560", joint_positions=np.zeros(6), joint_velocities=np.zeros(6),
+        tool_position=np.array([x, 0, 0]), tool_orientation=np.array([0, 0, 0, 1.0]),
+        tool_twist=np.zeros(6), reference_twist=np.zeros(6), nearest_obstacle="",
+        nearest_distance_m=None, contacts=(), stop="none", limited=(),
+    )  # fmt: skip
+
+
+def test_the_pose_is_that_of_one_robot() -> None:
+    scene = Scene()
+    present = {"A", "B"}
+    assert scene.feed.on_robot(1.0, source("A", "robot"), robot_at(0.1), present) == "taken"
+    assert scene.feed.on_robot(1.0, source("B", "robot"), robot_at(0.9), present) == "second"
+    position = scene.feed.controller._robot.position(1.0)
+    assert position is not None
+    assert position[0] == 0.1
+
+
+def test_another_robot_that_takes_over_has_no_past() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.feed.on_robot(scene.now_s, source("A", "robot"), robot_at(0.1), {"A"})
+    scene.guide(10)
+    scene.feed.on_robot(scene.now_s, source("B", "robot"), robot_at(0.9), {"B"})
+    assert scene.feed.controller._robot.at_step(5) is None
+    made = scene.sample("a", True)
+    assert made is not None
+    assert made.guide_origin is None
