@@ -118,12 +118,12 @@ class Showing:
             yield Shown(f"{PREFIX}trail", "foxglove.PosesInFrame", trail)
 
     def _joint_states(self, fields: dict[str, Any], log_ns: int) -> dict[str, Any]:
-        """Its joints as far as anybody named them."""
+        """Its joints, where the state or somebody else names them."""
         robot, positions = fields["robot"], fields["joint_positions"]
         velocities = fields["joint_velocities"]
-        if robot not in self._joints and len(self.nameless) < MOST_NAMELESS:
+        names = fields.get("joint_names") or self._joints.get(robot, ())
+        if not names and robot not in self._joints and len(self.nameless) < MOST_NAMELESS:
             self.nameless.add(robot)
-        names = self._joints.get(robot, ())
         if not len(names) == len(positions) == len(velocities):
             names = ()
         joints = [

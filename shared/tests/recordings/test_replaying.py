@@ -191,7 +191,6 @@ def test_another_model_has_all_evidence(said: list[Logged], model: Model, tmp_pa
         ("hmcs/@v1/demo/model/mine/belief", "mine"),
         ("hmcs/@v1/demo/model/mine/belief/a1b2", "mine"),
         ("hmcs/@v1/demo/model/model/belief/belief", "model"),
-        ("hmcs/@v1/demo/model/mine/evidence/belief", ""),
         ("hmcs/@v1/demo/model/belief", ""),
         ("unknown/3", ""),
     ],
