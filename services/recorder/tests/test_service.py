@@ -603,7 +603,7 @@ def test_joints_are_shown_by_the_names_that_the_robot_says_they_have(
     robots = bench.service._robots
     with pumped(robot.bus):
         stack.until(lambda: robot.state() or "two-joints" in robots._looks)
-        stack.until(lambda: robot.state() or not bench.service._recording.nameless)  # type: ignore[union-attr]
+        stack.until(lambda: robot.state() or not bench.service._recording.undescribed)  # type: ignore[union-attr]
         time_out = bench.bus.counters.received[RobotState.SCHEMA] + 20
         stack.until(
             lambda: robot.state() or bench.bus.counters.received[RobotState.SCHEMA] > time_out
