@@ -25,6 +25,8 @@ class Sample(NamedTuple):
     device: str
     """Its boot."""
     motion: Motion
+    captured_ns: int
+    """When it was taken, by the recorder's clock."""
 
     @property
     def engaged(self) -> bool:
@@ -51,4 +53,4 @@ def hand_of(content: RecordingContent) -> Iterator[Sample]:
             drives = ""
         else:
             continue
-        yield Sample(recorded.log_ns, device, motion)
+        yield Sample(recorded.log_ns, device, motion, recorded.captured_ns)
