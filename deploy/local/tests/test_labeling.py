@@ -138,3 +138,33 @@ def test_an_error_that_quotes_a_file_is_text(hmcs: Run, tmp_path: Path) -> None:
     assert code == 2
     assert "\\x1b[2Jnone.mcap" in err
     assert err.replace("\n", "").isprintable()
+
+
+def test_labels_of_another_recording_are_told_and_kept_aside(hmcs: Run, take: Path) -> None:
+    assert hmcs("label", take, "--set", "0-1=old")[0] == 0
+    take.unlink()
+    Maker(take.parent).write(list(hand_of(("carry", "lift"), 100)))
+    code, out, _ = hmcs("label", take)
+    assert code == 0
+    assert "note: the labels in take.labels.csv are of another recording" in out
+    assert [row[2].strip() for row in rows(out)] == ["carry", "lift"]
+    assert "take.labels.csv are of another recording" in hmcs("inspect", take)[1]
+    code, out, _ = hmcs("label", take, "--set", "0-1=lift")
+    assert code == 0
+    assert "the labels of another recording are in" in out
+    assert "old" in (take.parent / "take.labels-of-another-1.csv").read_text()
+    assert states(take)[0] == "lift"
+
+
+def test_labels_in_milliseconds_are_told_as_such(hmcs: Run, take: Path) -> None:
+    labels_beside(take).write_text("begin_s,end_s,state\n0,1000,lift\n1000,2000,carry\n")
+    code, _, error = hmcs("label", take)
+    assert code == 2
+    assert "read like milliseconds: divide them by 1000" in error
+
+
+def test_a_label_beyond_the_end_is_told(hmcs: Run, take: Path) -> None:
+    labels_beside(take).write_text("begin_s,end_s,state\n0,2.9,lift\n")
+    code, out, _ = hmcs("label", take)
+    assert code == 0
+    assert "note: take.labels.csv:2: label 'lift' from 0.000 s to 2.900 s ends after" in out

@@ -47,17 +47,17 @@ class Robots:
                 yield _unknown(robot)
 
     def name_joints(self, recording: Recording, now_ns: int) -> None:
-        """Have the robots in a recording shown by the names of their joints, asking some again.
+        """Keep how the robots in a recording look, and show them by the names of their joints.
 
-        That nobody says them is said in the recording and in the log. Raises OSError as writing
-        does.
+        Those of which that is not known are asked again; that one gives no answer is said in the
+        recording and in the log. Raises OSError as writing does.
         """
-        nameless = recording.nameless
-        for robot in nameless & self._looks.keys():
+        undescribed = recording.undescribed
+        for robot in undescribed & self._looks.keys():
             recording.name_joints(robot, self._looks[robot].joints)
         waiting = {
             robot
-            for robot in nameless - self._looks.keys()
+            for robot in undescribed - self._looks.keys()
             if self._asked.get(robot, 0) < MOST_ASKED
         }
         if not waiting or time.monotonic() < self._again_s:
@@ -74,7 +74,7 @@ class Robots:
             if self._asked[robot] == MOST_ASKED:
                 recording.add(_unknown(robot), now_ns)
                 self._log.warning(
-                    "a robot does not say how it looks: viewers cannot show its joints",
+                    "a robot does not say how it looks: viewers cannot show it",
                     extra={"robot": robot},
                 )
 
@@ -86,5 +86,5 @@ def _kept(looks: RobotLooks) -> Preface:
 
 
 def _unknown(robot: str) -> Preface:
-    facts = {"unknown": "it gives no answer to `looks`: its joints cannot be shown"}
+    facts = {"unknown": "it gives no answer to `looks`: it cannot be shown by its description"}
     return Preface({f"{JOINTS}{robot}": facts}, {})
