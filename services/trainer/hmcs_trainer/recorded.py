@@ -8,7 +8,7 @@ from hmcs.bus.messages import Motion
 from hmcs.recordings.inspection import losses_of
 from hmcs.recordings.reading import RecordingContent
 from hmcs.task import Task
-from hmcs_trainer.validation import Finding
+from hmcs_trainer.plausibility import Finding
 
 _WITH_A_TASK = ("input_device/", "robot/")
 """What the metadata of whoever works on a task begins with."""

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
 from hmcs.motion.lasa import read_drawing
@@ -14,6 +19,7 @@ from hmcs.recordings.parts import SUFFIX as RECORDING
 from hmcs.recordings.reading import RecordingContent, RecordingError, read
 from hmcs.task import Task
 
+_DRAWINGS = "lasa:"
 _DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
 
 
@@ -46,13 +52,64 @@ def read_sources(
     DemonstrationError for a reference that names none, RecordingError for a recording that cannot
     be used.
     """
-    return [_read(reference, task, labels_count) for reference in references]
+    return _told_apart([_read(reference, task, labels_count) for reference in references])
+
+
+def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
+    """Return the sources without demonstrations that are there already, and what was left out.
+
+    A demonstration is another one where its positions or its labels differ, whatever it is called:
+    a file may be named twice, or copied.
+    """
+    kept, told = list[Source](), list[str]()
+    known = dict[bytes, str]()
+    for source in sources:
+        own = []
+        for demonstration in source.demonstrations:
+            content = _digest(demonstration)
+            if content in known:
+                told.append(
+                    f"{demonstration.name}: the same samples as {known[content]}: left out, since "
+                    "it would count twice"
+                )
+            else:
+                known[content] = demonstration.name
+                own.append(demonstration)
+        if own:
+            kept.append(source._replace(demonstrations=tuple(own)))
+    return kept, told
+
+
+def _digest(demonstration: Demonstration) -> bytes:
+    digest = hashlib.sha256(repr(demonstration.states).encode())
+    for array in (demonstration.positions, demonstration.orientations, demonstration.wrenches):
+        digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+    return digest.digest()
+
+
+def _told_apart(sources: list[Source]) -> list[Source]:
+    """Call demonstrations of files of the same name by the whole reference, so that what is told
+    of one is not taken for another's."""
+    bare = Counter(path.name for path in {Path(source.reference) for source in sources})
+    return [
+        source
+        if bare[Path(source.reference).name] == 1 or source.reference.startswith(_DRAWINGS)
+        else source._replace(
+            demonstrations=tuple(
+                each._replace(
+                    name=source.reference + each.name.removeprefix(Path(source.reference).name)
+                )
+                for each in source.demonstrations
+            )
+        )
+        for source in sources
+    ]
 
 
 def _read(reference: str, task: Task, labels_count: bool) -> Source:
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
-    if not reference.startswith("lasa:"):
+    if not reference.startswith(_DRAWINGS):
         return Source(reference, (read_csv(reference),), None)
     match = _DRAWING.fullmatch(reference)
     if match is None:

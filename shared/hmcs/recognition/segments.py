@@ -92,7 +92,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
         raise LearningError(f"no demonstrations of task {task.name!r}: give at least one")
     segments: list[Segment] = []
     for index, demonstration in enumerate(demonstrations):
-        _check(demonstration)
+        check_arrays(demonstration)
         labeled, own, last = False, list[Segment](), -1
         for label, samples in demonstration.stretches:
             if label is None:
@@ -188,8 +188,9 @@ def _meant(task: Task, label: str, demonstration: Demonstration, sample: int) ->
     return index, [gesteme.name for gesteme in task.gestemes].index(chosen)
 
 
-def _check(demonstration: Demonstration) -> None:
-    """Refuse arrays that no file could have held; files are checked as they are read."""
+def check_arrays(demonstration: Demonstration) -> None:
+    """Raise LearningError for arrays that no file could have held; those of files are checked as
+    they are read."""
     name, samples = demonstration.name, len(demonstration.positions)
     expected = {
         "time_s": (samples,),
