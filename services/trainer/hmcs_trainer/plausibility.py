@@ -53,6 +53,8 @@ class Finding(NamedTuple):
     """What, where and when, and what to do."""
     may_be_accepted: bool = False
     """Whether something could be learned nevertheless, if somebody insists."""
+    unquoted: str = ""
+    """The text without what a file said instead of a name of the task; empty where it is none."""
 
 
 def implausible(task: Task, demonstration: Demonstration) -> list[Finding]:

@@ -19,8 +19,13 @@ from hmcs.recordings.parts import SUFFIX as RECORDING
 from hmcs.recordings.reading import RecordingContent, RecordingError, read
 from hmcs.task import Task
 
-_DRAWINGS = "lasa:"
-_DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
+DRAWINGS = "lasa:"
+"""What references to drawings begin with."""
+_DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d{1,6})(?:-(?P<last>\d{1,6}))?")
+
+
+class NoMotionError(RecordingError):
+    """A recording in which nobody moved anything; quotes nothing of it."""
 
 
 class Source(NamedTuple):
@@ -31,6 +36,11 @@ class Source(NamedTuple):
     """One at least."""
     recording: RecordingContent | None
     """None where it is no recording."""
+
+
+def is_drawing(reference: str) -> bool:
+    """Return whether a reference names drawings, and no file."""
+    return _DRAWING.fullmatch(reference) is not None
 
 
 def read_references(references: Sequence[str], task: Task) -> list[Demonstration]:
@@ -93,7 +103,7 @@ def _told_apart(sources: list[Source]) -> list[Source]:
     bare = Counter(path.name for path in {Path(source.reference) for source in sources})
     return [
         source
-        if bare[Path(source.reference).name] == 1 or source.reference.startswith(_DRAWINGS)
+        if bare[Path(source.reference).name] == 1 or source.reference.startswith(DRAWINGS)
         else source._replace(
             demonstrations=tuple(
                 each._replace(
@@ -109,7 +119,7 @@ def _told_apart(sources: list[Source]) -> list[Source]:
 def _read(reference: str, task: Task, labels_count: bool) -> Source:
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
-    if not reference.startswith(_DRAWINGS):
+    if not reference.startswith(DRAWINGS):
         return Source(reference, (read_csv(reference),), None)
     match = _DRAWING.fullmatch(reference)
     if match is None:
@@ -129,7 +139,7 @@ def _recorded(reference: str, labels_count: bool) -> Source:
     found = demonstrations_of(content) if labels_count else performances_of(content)
     if not found:
         moved = labels_count and labels_of(content) and performances_of(content)
-        raise RecordingError(
+        raise NoMotionError(
             f"{reference}: its labels are where the hand did not move: label its motion"
             if moved
             else f"{reference}: there is no motion of a hand in it that held on: hold the dead-man "

@@ -47,10 +47,12 @@ def refuse(serious: Sequence[Finding]) -> None:
     """Raise LearningError that tells all of these findings; nothing where there is none."""
     if not serious:
         return
-    text = "; ".join(finding.text for finding in serious)
-    if all(finding.may_be_accepted for finding in serious):
-        text += ". With --accept-implausible `hmcs train` learns from it all the same"
-    raise LearningError(text)
+    hint = ". With --accept-implausible `hmcs train` learns from it all the same"
+    end = hint if all(finding.may_be_accepted for finding in serious) else ""
+    raise LearningError(
+        "; ".join(finding.text for finding in serious) + end,
+        "; ".join(finding.unquoted or finding.text for finding in serious) + end,
+    )
 
 
 def check_learned(model: Model) -> None:

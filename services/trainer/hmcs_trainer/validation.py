@@ -47,7 +47,7 @@ def findings(task: Task, demonstrations: Sequence[Demonstration]) -> list[Findin
             check_arrays(demonstration)
             found += implausible(task, demonstration)
             found += _unlabeled(demonstration)
-            found += _hasty(demonstration)
+            found += _hasty(task, demonstration)
         segments = segments_of(task, demonstrations)
         found += _missing(task, segments)
         found += _rare(task, segments)
@@ -58,7 +58,7 @@ def findings(task: Task, demonstrations: Sequence[Demonstration]) -> list[Findin
             # Where hands jump, or units differ, disagreement is a consequence.
             check_agreement(task, segments)
     except LearningError as error:
-        found.append(Finding(True, str(error)))
+        found.append(Finding(True, str(error), unquoted=error.unquoted))
     return sorted(found, key=lambda finding: not finding.serious)
 
 
@@ -82,7 +82,8 @@ def _unlabeled(demonstration: Demonstration) -> list[Finding]:
     return found
 
 
-def _hasty(demonstration: Demonstration) -> list[Finding]:
+def _hasty(task: Task, demonstration: Demonstration) -> list[Finding]:
+    states = {state.name for state in task.states}
     return [
         Finding(
             False,
@@ -90,7 +91,9 @@ def _hasty(demonstration: Demonstration) -> list[Finding]:
             f"less than {LEAST_S:g} s: was the pedal pressed twice? Join it to its neighbor",
         )
         for label, samples in demonstration.stretches
-        if label is not None and _lasts_s(demonstration, samples) < LEAST_S
+        if label is not None
+        and label.partition("/")[0] in states
+        and _lasts_s(demonstration, samples) < LEAST_S
     ]
 
 
