@@ -87,7 +87,7 @@ def _far(task: Task, shown: Demonstration) -> Iterator[Finding]:
 
 
 def _jumps(task: Task, shown: Demonstration) -> Iterator[Finding]:
-    period_s, moved_m, speed_m_s = _motion(shown)
+    period_s, moved_m, speed_m_s = _motion(shown, _longest_periods(shown.time_s))
     length_m = length_of(steps_of(shown.positions, task.dead_zone_m))
     usual_m_s = length_m / float(shown.time_s[-1] - shown.time_s[0])
     velocity = np.diff(shown.positions, axis=0) / period_s[:, None]
@@ -122,7 +122,7 @@ def _sudden_turns(shown: Demonstration) -> Iterator[Finding]:
         return
     q = shown.orientations / np.linalg.norm(shown.orientations, axis=1, keepdims=True)
     turned_rad = 2.0 * np.arccos(np.clip(np.abs((q[1:] * q[:-1]).sum(axis=1)), 0.0, 1.0))
-    period_s = np.diff(shown.time_s)
+    period_s = _longest_periods(shown.time_s)
     far = (turned_rad > LARGEST_TURN_RAD) & (turned_rad / period_s > FASTEST_TURN_RAD_S)
     jumps = np.flatnonzero(far & _counts(shown))
     if len(jumps):
@@ -185,7 +185,7 @@ def _wrong_times(task: Task, shown: Demonstration) -> Iterator[Finding]:
 
 
 def _gaps(task: Task, shown: Demonstration) -> Iterator[Finding]:
-    period_s, moved_m, _ = _motion(shown)
+    period_s, moved_m, _ = _motion(shown, np.diff(shown.time_s))
     usual_s = float(np.median(period_s))
     if (period_s <= 2.0 * usual_s).mean() < REGULAR_SHARE:
         return
@@ -208,8 +208,24 @@ class _Motion(NamedTuple):
     speed_m_s: Array
 
 
-def _motion(shown: Demonstration) -> _Motion:
-    period_s = np.diff(shown.time_s)
+def _longest_periods(time_s: Array) -> Array:
+    """How long the hand may have had from each sample to the next, s, shape (T − 1,).
+
+    A recorder that was held up writes several samples at once: any of them may have been taken
+    just after the last one before.
+    """
+    period_s = np.diff(time_s)
+    short = period_s < 0.5 * np.median(period_s)
+    longest = period_s.copy()
+    since = 0
+    for k in range(len(period_s)):
+        if k and not short[k]:
+            since = k
+        longest[k] = time_s[k + 1] - time_s[since]
+    return longest
+
+
+def _motion(shown: Demonstration, period_s: Array) -> _Motion:
     moved_m = np.linalg.norm(np.diff(shown.positions, axis=0), axis=1)
     return _Motion(period_s, moved_m, moved_m / period_s)
 

@@ -134,6 +134,23 @@ def test_a_device_that_loses_some_samples_passes() -> None:
     assert implausible(TASK, thinned) == []
 
 
+def test_a_recorder_that_was_held_up_makes_no_jump_of_a_hand_that_went_on() -> None:
+    hand = shown(noise_m=0.0)
+    kept = np.ones(len(hand.time_s), dtype=bool)
+    # For 0.3 s nothing was heard of the hand, and the sample before came as late as the next.
+    kept[251:281] = False
+    time_s = hand.time_s.copy()
+    time_s[250] = time_s[281] - 0.001
+    late = Demonstration(
+        hand.name,
+        time_s[kept],
+        hand.positions[kept],
+        tuple(state for state, there in zip(hand.states, kept, strict=True) if there),
+    )
+    assert np.linalg.norm(np.diff(late.positions, axis=0), axis=1).max() > 0.04
+    assert implausible(TASK, late) == []
+
+
 # --- jumps ----------------------------------------------------------------------------------------
 
 
