@@ -282,6 +282,13 @@ def train(
     report: Annotated[
         bool, typer.Option(help="Write a page beside the model on what it is worth.")
     ] = True,
+    accept_implausible: Annotated[
+        bool,
+        typer.Option(
+            "--accept-implausible",
+            help="Learn even from what no hand seems to have made: jumps, other units.",
+        ),
+    ] = False,
 ) -> None:
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
@@ -305,6 +312,7 @@ def train(
             seed=seed,
             find_states=find_states,
             report=output.with_suffix(".html") if report else None,
+            accept_implausible=accept_implausible,
             progress=typer.echo,
             fits=fits,
         )
@@ -597,20 +605,20 @@ def check(
         typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER: whether they fit it and agree."),
     ] = None,
 ) -> None:
-    """Name every problem of a task file, with line and field; exit code 2 where there is one."""
+    """Name every problem of a task file, with line and field; exit code 2 where there is one.
+
+    Demonstrations are judged as by `hmcs train`: what it would refuse ends with exit code 2.
+    """
     from hmcs.fixtures.workspace import check_workspace
-    from hmcs.recognition.disagreement import check_agreement
-    from hmcs.recognition.segments import segments_of
     from hmcs.task import load_task
-    from hmcs_trainer.references import read_references
+    from hmcs_trainer.training import checked
 
     task = load_task(file)
     check_workspace(file, task)
     shown = ""
     if demonstrations:
-        read = read_references(demonstrations, task)
-        check_agreement(task, segments_of(task, read))
-        shown = f"; {len(read)} demonstrations agree"
+        count, told = checked(task, demonstrations, typer.echo)
+        shown = f"; {count} demonstrations agree" + (", but for what is told above" if told else "")
     counts = f"{len(task.gestemes)} gestemes, {len(task.states)} states"
     typer.echo(f"{file}: in order: {counts}{shown}")
 
