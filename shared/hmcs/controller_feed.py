@@ -36,6 +36,7 @@ class ControllerFeed:
         self.robot = FollowingRobot()
         self.clock = ""
         """Boot of the device whose steps count."""
+        self._newest = -1
         self._begin_orders()
 
     def on_motion(

@@ -7,6 +7,7 @@ import numpy as np
 from hmcs.bus import messages
 from hmcs.fixtures.exchanged import Guides, OperatorSample
 from hmcs.fixtures.rules import rules_of
+from hmcs.fixtures.tool_shape import tool_shape_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.fixtures.workspace import regions_of
 from hmcs.motion.steps import Step
@@ -65,7 +66,12 @@ def guides_of(model: Model) -> Guides:
     Raises RegionError for a region that cannot be.
     """
     return Guides(
-        model.paths, rules_of(model.task), regions_of(model.task), model.spreads, model.turns
+        model.paths,
+        rules_of(model.task),
+        regions_of(model.task),
+        model.spreads,
+        model.turns,
+        tool_shape_of(model.task),
     )
 
 

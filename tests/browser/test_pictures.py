@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from browser.viewing import TASK, Cell, Viewer
-from hmcs.recordings.labels import labels_beside, write_labels
+from hmcs.recordings.labels import write_labels
 from hmcs.recordings.reading import read
 from hmcs.recordings.stretches import Stretch
 from hmcs.task import load_task
@@ -79,7 +79,7 @@ def label_a_take(folder: Path) -> Path:
         Stretch(begin, end, state)
         for begin, end, state in zip(ends[:-1], ends[1:], states, strict=True)
     ]
-    write_labels(labels_beside(content.path), stretches, content.first_ns)
+    write_labels(content, stretches)
     return content.path.parent
 
 

@@ -268,8 +268,12 @@ def test_nesting_without_end_is_refused(depth) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("seq", 2**53 + 1), ("seq", 2**64 - 1), ("origin", {"boot": "b", "seq": 2**60, "captured_ns": 0})],
-)  # fmt: skip
+    [
+        ("seq", 2**53 + 1),
+        ("seq", 2**64 - 1),
+        ("origin", {"boot": "b", "seq": 2**60, "captured_ns": 0}),
+    ],
+)
 def test_a_number_no_source_counts_to_is_refused(fields, name, value) -> None:
     fields[name] = value
     with pytest.raises(RefusedMessageError, match="beyond"):

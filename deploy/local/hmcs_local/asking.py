@@ -1,36 +1,168 @@
-"""Asking a service of the running cell to do something."""
+"""Asking the services of the running cell to do something: all at once, and each one is heard."""
 
 from __future__ import annotations
 
-from hmcs.bus.messages import Done, Message
-from hmcs.bus.session import Bus, RequestRefusedError
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+from hmcs.bus.keys import ANY, Member
+from hmcs.bus.messages import Ask, Done, Message
+from hmcs.bus.presence import possible, present
+from hmcs.bus.session import Answer, Bus, RequestRefusedError
 from hmcs.errors import UserError
+from hmcs.shown import plain
+
+_ASKED_AT_ONCE = 256
+"""Of more than so many processes some wait until others have answered."""
+_ASK_AGAIN_S = 0.05
+_STRANGERS_SHOWN = 3
 
 
 class NobodyAnswersError(UserError):
     """A service that is asked for something is not there, or does not answer, or refuses."""
 
 
-def asked_of(bus: Bus, service: str, verb: str, question: Message, timeout_s: float = 2.0) -> str:
-    """Ask every instance of a service; return what they answer.
+class PartlyAnsweredError(NobodyAnswersError):
+    """Some have done what they were asked for, and others did not answer; nobody refused."""
 
-    Raises NobodyAnswersError where none is there, one does not answer, or one refuses.
+
+class Reply(NamedTuple):
+    """What one process made of what it was asked for."""
+
+    member: Member
+    done: bool
+    detail: str
+    """What it says it has done, or why it has not."""
+    refused: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.member.instance}: {plain(self.detail)}"
+
+
+class Replies(NamedTuple):
+    """What everybody made of it."""
+
+    each: tuple[Reply, ...]
+    """Sorted by name; everybody who is present, and whoever else has answered."""
+    strangers: tuple[str, ...] = ()
+    """Tokens of impossible names: no process bears one, and nobody is asked for it."""
+
+    @property
+    def all_done(self) -> bool:
+        """Whether everybody has done it."""
+        return all(reply.done for reply in self.each)
+
+
+def ask_everybody(
+    bus: Bus, service: str, verb: str, question: Message, timeout_s: float = 2.0
+) -> Replies:
+    """Ask every instance of a service that is present, all at once; return what each made of it.
+
+    Raises NobodyAnswersError where none is present.
     """
-    keys = bus.keys
-    present = [keys.member_of(key) for key in bus.alive(keys.presence(service))]
-    if not present:
-        raise NobodyAnswersError(
-            f"no {service.replace('_', ' ')} in cell {bus.settings.cell}: start one, e.g. by "
-            f"python -m hmcs_{service}"
-        )
-    details: list[str] = []
-    for member in present:
-        key = keys.rpc(member.service, member.instance, verb)
+    there = present(bus.keys, bus.alive(bus.keys.presence(service)))
+    if not there.members:
+        raise _nobody(bus, service, there.strangers)
+    return Replies(_asked(bus, there.members, verb, question, timeout_s), there.strangers)
+
+
+def asked_of(bus: Bus, service: str, verb: str, question: Message, timeout_s: float = 2.0) -> str:
+    """Ask every instance of a service; return what they have done.
+
+    Raises NobodyAnswersError where none is present, one refuses or none answers, and
+    PartlyAnsweredError where some have done it and others do not answer.
+    """
+    replies = ask_everybody(bus, service, verb, question, timeout_s).each
+    told = "; ".join(map(str, replies))
+    if any(reply.refused for reply in replies) or not any(reply.done for reply in replies):
+        raise NobodyAnswersError(told)
+    if not all(reply.done for reply in replies):
+        raise PartlyAnsweredError(told)
+    return plain(replies[0].detail) if len(replies) == 1 else told
+
+
+def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
+    """Let every robot of the cell stand, whoever drives it; return what each says.
+
+    All are asked at once, before anybody is looked for: no robot waits for another one, or for a
+    token that is there. Those who are present are asked by name as well, again and again until they
+    answer, refuse or `timeout_s` is over. Raises NobodyAnswersError where there is no robot.
+    """
+    with ThreadPoolExecutor(1) as aside:
+        of_all = aside.submit(_answers, bus, Member("robot", ANY), "stop", Ask(), timeout_s)
+        there = present(bus.keys, bus.alive(bus.keys.presence("robot")))
+        by_name = _asked(bus, there.members, "stop", Ask(), timeout_s, again=True)
+    replies = {reply.member: reply for reply in by_name}
+    for answer in of_all.result() if of_all.exception() is None else ():
+        member = _sender(answer)
+        if possible(member) and not (member in replies and replies[member].done):
+            replies[member] = Reply(member, True, answer.body.detail)
+    if not replies:
+        raise _nobody(bus, "robot", there.strangers)
+    return Replies(tuple(sorted(replies.values())), there.strangers)
+
+
+def left_out(strangers: Sequence[str]) -> str:
+    """Return a line about tokens of impossible names; empty where there are none."""
+    if not strangers:
+        return ""
+    shown = ", ".join(
+        repr(plain("/".join(token.split("/")[3:]), 60)) for token in strangers[:_STRANGERS_SHOWN]
+    )
+    more = ", …" if len(strangers) > _STRANGERS_SHOWN else ""
+    return f"left out, since no process can bear such a name ({len(strangers)}): {shown}{more}"
+
+
+def _asked(
+    bus: Bus,
+    members: Sequence[Member],
+    verb: str,
+    question: Message,
+    timeout_s: float,
+    *,
+    again: bool = False,
+) -> tuple[Reply, ...]:
+    """Ask each of `members` under its own name, all at once."""
+
+    def ask(member: Member) -> Reply:
+        deadline_s = time.monotonic() + timeout_s
         try:
-            answers = bus.ask(key, question, Done, timeout_s)
+            while True:
+                left_s = max(_ASK_AGAIN_S, deadline_s - time.monotonic())
+                for answer in _answers(bus, member, verb, question, left_s):
+                    if _sender(answer) == member:
+                        return Reply(member, True, answer.body.detail)
+                if not again or time.monotonic() + _ASK_AGAIN_S >= deadline_s:
+                    return Reply(member, False, f"did not answer within {timeout_s:g} s")
+                time.sleep(_ASK_AGAIN_S)
         except RequestRefusedError as error:
-            raise NobodyAnswersError(f"{member.instance}: {error}") from None
-        if not answers:
-            raise NobodyAnswersError(f"{member.instance} does not answer: see `hmcs status`")
-        details += [answer.body.detail for answer in answers]
-    return "; ".join(details)
+            return Reply(member, False, f"refused: {error}", refused=True)
+        except Exception as error:  # whatever it is, the others are heard
+            return Reply(member, False, f"could not be asked: {type(error).__name__}: {error}")
+
+    if not members:
+        return ()
+    with ThreadPoolExecutor(min(len(members), _ASKED_AT_ONCE)) as asking:
+        return tuple(asking.map(ask, members))
+
+
+def _answers(
+    bus: Bus, member: Member, verb: str, question: Message, timeout_s: float
+) -> list[Answer[Done]]:
+    key = bus.keys.rpc(member.service, member.instance, verb)
+    return bus.ask(key, question, Done, timeout_s)
+
+
+def _sender(answer: Answer[Done]) -> Member:
+    """Return who says that it has answered."""
+    return Member(answer.envelope.source.service, answer.envelope.source.instance)
+
+
+def _nobody(bus: Bus, service: str, strangers: Iterable[str]) -> NobodyAnswersError:
+    remark = left_out(tuple(strangers))
+    return NobodyAnswersError(
+        f"no {service.replace('_', ' ')} in cell {bus.settings.cell}: start one, e.g. by "
+        f"python -m hmcs_{service}" + (f" ({remark})" if remark else "")
+    )

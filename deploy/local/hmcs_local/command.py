@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -14,6 +15,9 @@ from rich.text import Text
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+
+if TYPE_CHECKING:
+    from hmcs_local.asking import Replies
 
 USER_MISTAKE = 2
 
@@ -31,6 +35,15 @@ _Router = Annotated[
 ]
 _Cell = Annotated[
     str, typer.Option(envvar="HMCS_CELL", metavar="NAME", help="Which operator and robot.")
+]
+_Open = Annotated[
+    bool,
+    typer.Option(
+        "--open-to-network",
+        envvar="HMCS_OPEN_TO_NETWORK",
+        help="Let the router listen beyond this machine without TLS: everybody who reaches its "
+        "port can move the robot.",
+    ),
 ]
 _Folder = Annotated[
     Path, typer.Option(metavar="DIR", help="Where `hmcs up` keeps logs, models and recordings.")
@@ -61,6 +74,7 @@ def up(
         Path | None, typer.Option(metavar="FILE", help="The stack; compose.yaml by default.")
     ] = None,
     folder: _Folder = DEFAULT_FOLDER,
+    open_to_network: _Open = False,
 ) -> None:
     """Run the stack of compose.yaml as processes here, with the router embedded.
 
@@ -77,6 +91,7 @@ def up(
             scale=dict(_scale(item) for item in scale or []),
             router=router,
             folder=folder,
+            open_to_network=open_to_network,
             while_waiting=while_waiting,
         ),
         lambda who, what: console.print(_line(who, what)),
@@ -90,9 +105,10 @@ def status(
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
 ) -> None:
-    """Show who is there, how each is, rates, losses and the active model.
+    """Show who is there, how each is, rates, losses and the active model, and whether it is run.
 
-    With --once, the exit code is 0 when somebody is there and everybody is healthy, else 1.
+    With --once, the exit code is 0 when somebody is there, everybody is healthy and somebody runs
+    the model that is followed, else 1.
     """
     from hmcs_local.observer import open_observer
     from hmcs_local.status import show_status
@@ -133,23 +149,30 @@ def swap(
     goes on. Both belong to the `hmcs up` of --folder.
 
     `hmcs swap --activate MODEL` lets the fixture follow the belief of another recognizer that runs
-    already, in the shadow of the active one.
+    already, in the shadow of the active one. The exit code is 1 where only some fixtures answer.
     """
     from hmcs_local import swap as swapping
     from hmcs_local.control import Control
+    from hmcs_local.interrupts import interruptible
     from hmcs_local.observer import open_observer
 
     if bool(instance) == bool(activate) or (command and not instance) or (load and instance):
         raise UserError("name either a classifier to replace or a model to --activate")
-    with open_observer(router, cell) as bus:
+    with interruptible(), open_observer(router, cell) as bus:
         if instance:
             swapping.replace_classifier(
                 bus, Control(folder), instance, command=shlex.split(command), tell=typer.echo
             )
-        else:
-            if load:
-                typer.echo(swapping.load(bus, load))
-            typer.echo(swapping.activate(bus, activate))
+            return
+        partly = False
+        for change, what in ((swapping.load, load), (swapping.activate, activate)):
+            try:
+                if what:
+                    typer.echo(change(bus, what))
+            except swapping.PartlySwappedError as error:
+                typer.echo(error, err=True)
+                partly = True
+    raise typer.Exit(int(partly))
 
 
 @app.command()
@@ -176,32 +199,45 @@ def deploy(
     """
     from hmcs_local import deploying
     from hmcs_local.control import Control
+    from hmcs_local.interrupts import interruptible
     from hmcs_local.observer import open_observer
+    from hmcs_local.swap import PartlySwappedError
 
     if (model is None) != back:
         raise UserError("name either a model file or --back")
-    with open_observer(router, cell) as bus:
-        if model is None:
-            typer.echo(f"back to {deploying.back(bus, Control(folder), folder, typer.echo)}")
-        else:
-            deploying.deploy(bus, Control(folder), folder, model, watch_s=watch_s, tell=typer.echo)
+    control = Control(folder)
+    with interruptible(), open_observer(router, cell) as bus:
+        try:
+            if model is None:
+                typer.echo(f"back to {deploying.back(bus, control, folder, typer.echo)}")
+            else:
+                deploying.deploy(bus, control, folder, model, watch_s=watch_s, tell=typer.echo)
+        except PartlySwappedError as error:
+            typer.echo(f"what was active before goes on, too: {error}", err=True)
+            raise typer.Exit(1) from None
 
 
 @app.command()
 def router(
     listen: Annotated[
-        str, typer.Option(metavar="ENDPOINT", help="Where it listens.")
-    ] = DEFAULT_ROUTER,
+        str | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help=f"Where it listens; what --config names by default, or {DEFAULT_ROUTER}.",
+        ),
+    ] = None,
     config: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A Zenoh json5 file, for TLS, access, …")
     ] = None,
+    open_to_network: _Open = False,
 ) -> None:
-    """Run a router alone, until Ctrl-C."""
+    """Run a router alone, until Ctrl-C. It is reached from this machine only, unless told to."""
     from hmcs.bus.router import main as run_router
 
-    raise typer.Exit(
-        run_router(["--listen", listen, *(["--config", str(config)] if config else [])])
-    )
+    words = ["--listen", listen] if listen else []
+    words += ["--config", str(config)] if config else []
+    words += ["--open-to-network"] if open_to_network else []
+    raise typer.Exit(run_router(words))
 
 
 @app.command()
@@ -274,13 +310,17 @@ def train(
 
 @app.command()
 def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
-    """Let the trainer of a cell give up what it was asked to train; no model is written."""
+    """Let every trainer of a cell give up what it was asked to train; no model is written.
+
+    The exit code is 0 where each one has done it, else 1.
+    """
     from hmcs.bus.messages import Ask
-    from hmcs_local.asking import asked_of
+    from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        typer.echo(asked_of(bus, "trainer", "cancel", Ask(), timeout_s=5.0))
+        replies = ask_everybody(bus, "trainer", "cancel", Ask(), timeout_s=5.0)
+    raise typer.Exit(_told(replies))
 
 
 @app.command()
@@ -301,13 +341,17 @@ def record(
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
 ) -> None:
-    """Let the recorder begin a recording, or end it."""
+    """Let every recorder begin a recording, or end it.
+
+    The exit code is 0 where each one has done it, else 1.
+    """
     from hmcs.bus.messages import Record
-    from hmcs_local.asking import asked_of
+    from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        typer.echo(asked_of(bus, "recorder", "record", Record(on=not stop, name=name)))
+        replies = ask_everybody(bus, "recorder", "record", Record(on=not stop, name=name))
+    raise typer.Exit(_told(replies))
 
 
 @app.command()
@@ -328,13 +372,17 @@ def mark(
 
 @app.command()
 def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
-    """Let the robot stand, whoever drives it, until its operator lets go and takes hold again."""
-    from hmcs.bus.messages import Ask
-    from hmcs_local.asking import asked_of
+    """Let every robot stand, whoever drives it, until its operator lets go and takes hold again.
+
+    All are asked at once. The exit code is 0 where every robot that is present says that it stands,
+    else 1.
+    """
+    from hmcs_local.asking import stop_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        typer.echo(asked_of(bus, "robot", "stop", Ask()))
+        replies = stop_everybody(bus)
+    raise typer.Exit(_told(replies))
 
 
 @app.command()
@@ -438,7 +486,8 @@ def replay(
     done by that: an open loop, in which hand and robot are where they were recorded and react to
     nothing. Both stand beside what was recorded.
 
-    --json: `steps` `compared` `same_bits` `agreement` `later_steps` of the beliefs; shares right by
+    --json: `steps`, those of them `degraded` (believed without all evidence live), the others
+    `compared`, `same_bits` `agreement` `later_steps` of their beliefs; shares right by
     the labels `replayed_right` `recorded_right`; `times_real` as fast as it happened; of the
     fixture, over its ticks with a recorded one, `fixture_ticks` `_compared`, mean |Δk|
     `_factor_apart`, shares `_factor_close` (within 0.02) `_same_state` `_guides_both`
@@ -582,11 +631,25 @@ def demo(
 
 def main() -> None:
     """Run the command; a mistake of the user is one message and exit code 2, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal may know ASCII only
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except UserError as error:
         sys.stderr.write(f"hmcs: {error}\n")
         sys.exit(USER_MISTAKE)
+
+
+def _told(replies: Replies) -> int:
+    """Tell what each has done, and on stderr who has not; return the exit code."""
+    from hmcs_local.asking import left_out
+
+    for reply in replies.each:
+        typer.echo(str(reply), err=not reply.done)
+    if remark := left_out(replies.strangers):
+        typer.echo(remark, err=True)
+    return 0 if replies.all_done else 1
 
 
 def _scale(item: str) -> tuple[str, int]:

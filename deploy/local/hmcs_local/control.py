@@ -5,9 +5,9 @@ asks, one JSON line answers:
 
     {"start": SERVICE, "command": [...] or null}    {"instance": NAME}
     {"stop": INSTANCE}                              {"exit_code": N}
-    {"runs": INSTANCE}                              {"runs": true or false}
+    {"runs": INSTANCE}                              {"runs": true or false, "command": [...]}
 
-or `{"error": TEXT}`.
+or `{"error": TEXT}`. Both sides see to it that the other is this user.
 """
 
 from __future__ import annotations
@@ -17,15 +17,22 @@ import hashlib
 import json
 import os
 import socket
+import stat
+import struct
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
 from hmcs.errors import UserError
 from hmcs_local.stack import LocalStack
 
+LONGEST_BYTES = 64 * 2**10
+"""Of a question or an answer."""
 _REQUEST_TIMEOUT_S = 2.0
 _ANSWER_TIMEOUT_S = 20.0
 
@@ -44,6 +51,26 @@ def control_path(folder: Path) -> Path:
     return base / f"hmcs-{os.getuid()}" / f"{name}.sock"
 
 
+class _Request(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class _Start(_Request):
+    start: str
+    command: list[str] | None = Field(default=None, min_length=1)
+
+
+class _Stop(_Request):
+    stop: str
+
+
+class _Runs(_Request):
+    runs: str
+
+
+_REQUESTS: TypeAdapter[_Start | _Stop | _Runs] = TypeAdapter(_Start | _Stop | _Runs)
+
+
 class ControlServer:
     """Carries out what other commands ask of a stack; `serve` does it in the caller's thread."""
 
@@ -55,9 +82,7 @@ class ControlServer:
     def __enter__(self) -> Self:
         folder = self._path.parent
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
-        if status.st_uid != os.getuid() or status.st_mode & 0o077:
-            raise ControlError(f"{folder} can be used by others: remove it, or set XDG_RUNTIME_DIR")
+        _check_private(folder)
         if _is_answered(self._path):
             raise ControlError(
                 f"another `hmcs up` works in {self._stack.folder}: stop it, or choose another "
@@ -78,34 +103,43 @@ class ControlServer:
         self._path.unlink(missing_ok=True)
 
     def serve(self, timeout_s: float) -> None:
-        """Wait at most so long for a request, and answer it."""
+        """Wait at most so long for a request, and answer it; whatever comes, it goes on."""
         self._socket.settimeout(timeout_s)
         try:
             connection, _ = self._socket.accept()
-        except TimeoutError:
+        except OSError:  # nobody asks, or who did is gone again
             return
         # The asker may be gone before it has asked or heard the answer: that is its own affair.
         with connection, contextlib.suppress(OSError):
-            connection.settimeout(_REQUEST_TIMEOUT_S)
-            with connection.makefile("rw", encoding="utf-8") as stream:
-                line = stream.readline()
-                if line:
-                    stream.write(json.dumps(self._answer(line)) + "\n")
+            if not _is_this_user(connection):
+                return
+            line = _line_from(connection, _REQUEST_TIMEOUT_S)
+            if line:
+                connection.settimeout(_REQUEST_TIMEOUT_S)
+                connection.sendall(_as_line(self._answer(line)))
 
-    def _answer(self, line: str) -> dict[str, Any]:
+    def _answer(self, line: bytes) -> dict[str, Any]:
         try:
-            request = json.loads(line)
-            if "start" in request:
-                process = self._stack.start(request["start"], command=request.get("command"))
-                return {"instance": process.instance}
-            if "runs" in request:
-                known = self._stack.processes.get(request["runs"])
-                return {"runs": known is not None and known.running}
-            return {"exit_code": self._stack.processes[request["stop"]].stop()}
-        except (UserError, OSError) as error:
-            return {"error": str(error)}
-        except (ValueError, TypeError, KeyError) as error:
-            return {"error": f"not understood: {error}"}
+            request = _REQUESTS.validate_json(line)
+        except ValidationError as error:
+            return {"error": f"not understood: {error.errors(include_url=False)[0]['msg']}"}
+        try:
+            match request:
+                case _Start():
+                    process = self._stack.start(request.start, command=request.command)
+                    return {"instance": process.instance}
+                case _Runs():
+                    known = self._stack.processes.get(request.runs)
+                    if known is None or not known.running:
+                        return {"runs": False, "command": []}
+                    return {"runs": True, "command": list(known.command)}
+                case _Stop():
+                    if request.stop not in self._stack.processes:
+                        return {"error": f"{request.stop!r} was not started here"}
+                    return {"exit_code": self._stack.processes[request.stop].stop()}
+        except Exception as error:  # of one request: the stack goes on
+            told = str(error) if isinstance(error, (UserError, OSError)) else repr(error)
+            return {"error": told}
 
 
 class Control:
@@ -127,15 +161,19 @@ class Control:
         """Return whether it started `instance` and that still runs."""
         return bool(self._ask({"runs": instance})["runs"])
 
+    def command(self, instance: str) -> tuple[str, ...]:
+        """Return the command of an instance it started and that still runs; empty for any other."""
+        return tuple(self._ask({"runs": instance})["command"])
+
     def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        path = control_path(self._folder)
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
             connection.settimeout(_ANSWER_TIMEOUT_S)
             try:
-                connection.connect(str(control_path(self._folder)))
-                with connection.makefile("rw", encoding="utf-8") as stream:
-                    stream.write(json.dumps(request) + "\n")
-                    stream.flush()
-                    answer = json.loads(stream.readline())
+                _check_private(path.parent)
+                connection.connect(str(path))
+                connection.sendall(_as_line(request))
+                answer = json.loads(_line_from(connection, _ANSWER_TIMEOUT_S))
             except (OSError, ValueError):
                 raise ControlError(
                     f"no `hmcs up` works in {self._folder.resolve()}: start one, or name the "
@@ -144,6 +182,44 @@ class Control:
         if "error" in answer:
             raise ControlError(answer["error"])
         return dict(answer)
+
+
+def _as_line(message: dict[str, Any]) -> bytes:
+    return json.dumps(message).encode() + b"\n"
+
+
+def _line_from(connection: socket.socket, timeout_s: float) -> bytes:
+    """Return the line that comes within `timeout_s`; empty where none comes, or one too long."""
+    deadline_s = time.monotonic() + timeout_s
+    data = b""
+    while not data.endswith(b"\n"):
+        connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
+        more = connection.recv(LONGEST_BYTES + 1 - len(data))
+        data += more
+        if not more or len(data) > LONGEST_BYTES or time.monotonic() > deadline_s:
+            return b""
+    return data
+
+
+def _check_private(folder: Path) -> None:
+    """Raise ControlError where others than this user can use a folder, or have put it there."""
+    status = folder.lstat()
+    if (
+        not stat.S_ISDIR(status.st_mode)
+        or status.st_uid != os.getuid()
+        or stat.S_IMODE(status.st_mode) & 0o077
+    ):
+        raise ControlError(f"{folder} can be used by others: remove it, or set XDG_RUNTIME_DIR")
+
+
+def _is_this_user(connection: socket.socket) -> bool:
+    """Whether who asks is this user, where the system tells; the folder keeps others out, too."""
+    if not hasattr(socket, "SO_PEERCRED"):
+        return True
+    credentials = connection.getsockopt(
+        socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i")
+    )
+    return bool(struct.unpack("3i", credentials)[1] == os.getuid())
 
 
 def _is_answered(path: Path) -> bool:

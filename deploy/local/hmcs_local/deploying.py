@@ -2,56 +2,35 @@
 
 The newcomer runs as a shadow first: it replays the last steps, is compared with the active
 recognizer for a while, and only then does the fixture follow it. The old one goes afterwards, if
-`hmcs deploy` had brought it; the layered stack of compose.yaml stays.
+`hmcs deploy` had brought it; the layered stack of compose.yaml stays. A newcomer that does not take
+over, whatever the reason, is stopped again.
 """
 
 from __future__ import annotations
 
+import fcntl
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
-from hmcs.bus.keys import ANY
+from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import Ask, Belief, Description
-from hmcs.bus.session import Bus, Received
+from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.whole_files import written_whole
+from hmcs.shown import plain
 from hmcs_local import swap
 from hmcs_local.control import Control
+from hmcs_local.deployments import Deployed, DeployError, History, read_history, write_history
+from hmcs_local.observer import speakers
 
 READY_WITHIN_S = 15.0
 SERVICE = "recognizer"
 _LOOK_EVERY_S = 0.05
-
-
-class DeployError(UserError):
-    """A model that was not activated; what was active is active still."""
-
-
-class Deployed(BaseModel):
-    """A model that was active, and where it came from."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    model: str
-    path: str = ""
-    """Of its file; empty where it was not deployed but part of the stack."""
-    instance: str = ""
-    """Of the recognizer that runs it; empty where it is part of the stack."""
-
-
-class History(BaseModel):
-    """What was deployed in a folder, oldest first; the last one is active."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    deployed: tuple[Deployed, ...] = ()
 
 
 class Agreement(NamedTuple):
@@ -68,26 +47,6 @@ class Agreement(NamedTuple):
         return f"the same likely state in {self.alike} of {self.steps} steps"
 
 
-def read_history(folder: Path) -> History:
-    """Return what was deployed in the folder of `hmcs up`.
-
-    Raises DeployError where the file that says so cannot be understood.
-    """
-    file = _history_file(folder)
-    if not file.is_file():
-        return History()
-    try:
-        return History.model_validate_json(file.read_text(encoding="utf-8"))
-    except (ValidationError, OSError) as error:
-        raise DeployError(f"{file}: cannot be understood, remove it: {error}") from None
-
-
-def write_history(folder: Path, history: History) -> None:
-    """Write what was deployed, whole or not at all."""
-    with written_whole(_history_file(folder)) as unfinished:
-        unfinished.write_text(history.model_dump_json(indent=2), encoding="utf-8")
-
-
 def deploy(
     bus: Bus,
     control: Control,
@@ -99,25 +58,27 @@ def deploy(
 ) -> Agreement:
     """Let a model's recognizer take over; return how it agreed with the one that was active.
 
-    Raises DeployError where it bears the name of the active one, ModelFileError for its file,
-    SwapError where it does not become ready, and ControlError as `hmcs swap` does.
+    Raises DeployError where it bears the name of the active one, or another model of its name is
+    run already; ModelFileError for its file, SwapError where it does not become ready or a fixture
+    refuses it, and ControlError as `hmcs swap` does. PartlySwappedError is raised where some
+    fixtures follow it and others do not answer: the old one goes on then, too.
     """
-    model, history = load_model(file), read_history(folder)
-    active = active_model(bus)
-    if model.name == active:
-        raise DeployError(
-            f"{file}: is called {model.name!r}, as the active model is: train it under another "
-            "name, with --name, so that both can run side by side"
-        )
-    now = _active(history, active)
-    newcomer = _brought_up(bus, control, model, file, tell)
-    agreement = watched(bus, active, model.name, watch_s)
-    tell(f"beside {active}: {agreement}" if active else str(agreement))
-    tell(swap.activate(bus, model.name))
-    _let_go(control, now, tell)
-    kept = [*history.deployed[:-1], now] if history.deployed else [now] if active else []
-    deployed = Deployed(model=model.name, path=str(file.resolve()), instance=newcomer)
-    write_history(folder, History(deployed=(*kept, deployed)))
+    model = load_model(file)
+    with _alone(control, folder):
+        active = active_model(bus)
+        if model.name == active:
+            raise DeployError(
+                f"{file}: is called {model.name!r}, as the active model is: train it under another "
+                "name, with --name, so that both can run side by side"
+            )
+        history = _settled(read_history(folder), active, control, tell)
+        now = _active(history, active)
+        kept = [*history.deployed[:-1], now] if history.deployed else [now] if active else []
+        with _shadow(bus, control, folder, history, model, file, tell) as newcomer:
+            agreement = watched(bus, active, model.name, watch_s)
+            tell(f"beside {active}: {agreement}" if active else str(agreement))
+            _take_over(bus, folder, History(deployed=(*kept, newcomer)), tell)
+        _let_go(control, now, tell)
     return agreement
 
 
@@ -126,33 +87,47 @@ def back(
 ) -> str:
     """Return to the model that was active before; return its name.
 
-    Raises DeployError where nothing was deployed before it.
+    Raises DeployError where nothing was deployed before it, and what `deploy` raises.
     """
-    history = read_history(folder)
-    if len(history.deployed) < 2:
-        raise DeployError(f"nothing to return to: no model was deployed in {folder.resolve()}")
-    *older, before, now = history.deployed
-    instance = before.instance
-    if before.path and not control.owns(instance):
-        file = Path(before.path)
-        instance = _brought_up(bus, control, load_model(file), file, tell)
-    tell(swap.activate(bus, before.model))
-    _let_go(control, now, tell)
-    returned = before.model_copy(update={"instance": instance})
-    write_history(folder, History(deployed=(*older, returned)))
+    with _alone(control, folder):
+        history = _settled(read_history(folder), active_model(bus), control, tell)
+        if len(history.deployed) < 2:
+            raise DeployError(f"nothing to return to: no model was deployed in {folder.resolve()}")
+        *older, before, now = history.deployed
+        if before.path and not _runs(control, before):
+            file = Path(before.path)
+            model = load_model(file)
+            with _shadow(bus, control, folder, history, model, file, tell) as returned:
+                _take_over(bus, folder, History(deployed=(*older, returned)), tell)
+        else:
+            _take_over(bus, folder, History(deployed=(*older, before)), tell)
+        _let_go(control, now, tell)
     return before.model
 
 
 def active_model(bus: Bus) -> str:
     """Return the name of the recognizer the fixture follows; empty where it follows none.
 
-    Raises DeployError where there is no fixture controller.
+    Raises DeployError where there is no fixture controller, or several follow different ones.
     """
     key = bus.keys.rpc("fixture_controller", ANY, "describe")
     answers = bus.ask(key, Ask(), Description)
     if not answers:
         raise DeployError(
             f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
+        )
+    followed = {
+        answer.envelope.source.instance: answer.body.facts.get("active_model", "")
+        for answer in answers
+    }
+    if len(set(followed.values())) > 1:
+        told = ", ".join(
+            f"{plain(instance)} {plain(model) or 'none'}"
+            for instance, model in sorted(followed.items())
+        )
+        raise DeployError(
+            f"fixture controllers follow different models ({told}): let all follow one first, by "
+            "`hmcs swap --activate MODEL`"
         )
     return answers[0].body.facts.get("active_model", "")
 
@@ -183,28 +158,128 @@ def _active(history: History, active: str) -> Deployed:
     return Deployed(model=active)
 
 
-def _brought_up(
-    bus: Bus, control: Control, model: Model, file: Path, tell: Callable[[str], None]
-) -> str:
-    """Lend a model's guides to the fixture, start its shadow and wait until it has replayed."""
+@contextmanager
+def _alone(control: Control, folder: Path) -> Iterator[None]:
+    """Keep every other `hmcs deploy` of a folder out; raises DeployError where one is at work."""
+    control.owns("")  # where no `hmcs up` works in the folder, nothing is begun
+    with (folder / ".deploying").open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise DeployError(
+                f"another `hmcs deploy` is at work in {folder.resolve()}: wait until it has ended"
+            ) from None
+        yield
+
+
+def _settled(
+    history: History, active: str, control: Control, tell: Callable[[str], None]
+) -> History:
+    """Return the history after a newcomer that a killed `hmcs deploy` may have left behind."""
+    left = history.shadow
+    if left is None:
+        return history
+    if left.model == active:
+        return History(deployed=(*history.deployed, left))
+    _let_go(control, left, tell)
+    return History(deployed=history.deployed)
+
+
+@contextmanager
+def _shadow(
+    bus: Bus,
+    control: Control,
+    folder: Path,
+    history: History,
+    model: Model,
+    file: Path,
+    tell: Callable[[str], None],
+) -> Iterator[Deployed]:
+    """Bring a model up as a shadow that has replayed; where the block fails, stop it again.
+
+    Where somebody runs that very model already it is taken as it is, and left as it is. One that
+    a fixture follows in the end goes on, whatever failed.
+    """
+    path = str(file.resolve())
+    runner = _runner(bus, model)
     # Before it says anything: a belief of a model that is not loaded is refused.
-    tell(swap.load(bus, str(file.resolve())))
-    command = [sys.executable, "-m", f"hmcs_{SERVICE}", "--model", str(file.resolve())]
-    instance = control.start(SERVICE, command)
-    tell(f"{instance} started with {model.name} {model.hash}, a shadow until it is ready")
-    member = bus.keys.member(model.name, SERVICE, instance)
-    swap.until_ready(
-        bus, control, instance, lambda: bool(bus.alive(member)), READY_WITHIN_S, "what was active"
-    )
-    tell(f"{instance} has replayed and is ready")
-    return instance
+    try:
+        tell(swap.load(bus, path))
+    except swap.PartlySwappedError as error:
+        tell(f"not every fixture answers: {error}")
+    if runner is not None:
+        tell(f"{runner.instance} runs {model.name} {model.hash} already")
+        yield Deployed(model=model.name, path=path)
+        return
+
+    def is_followed() -> bool:
+        try:
+            return active_model(bus) == model.name
+        except (UserError, RequestRefusedError):
+            return False
+
+    command = [sys.executable, "-m", f"hmcs_{SERVICE}", "--model", path]
+    newcomer = Deployed(model=model.name, path=path)
+    try:
+        with swap.started(control, SERVICE, command, keep=is_followed, tell=tell) as instance:
+            newcomer = newcomer.model_copy(update={"instance": instance})
+            write_history(folder, history.model_copy(update={"shadow": newcomer}))
+            tell(f"{instance} started with {model.name} {model.hash}, a shadow until it is ready")
+            member = bus.keys.member(model.name, SERVICE, instance)
+            swap.until_ready(
+                bus,
+                control,
+                instance,
+                lambda: bool(bus.alive(member)),
+                READY_WITHIN_S,
+                "what was active",
+            )
+            tell(f"{instance} has replayed and is ready")
+            yield newcomer
+    except BaseException:
+        if newcomer.instance and not control.owns(newcomer.instance):
+            with suppress(DeployError):
+                write_history(folder, history)
+        raise
+
+
+def _runner(bus: Bus, model: Model) -> Member | None:
+    """Return who runs a model; None where nobody does, or who does is not answering.
+
+    Raises DeployError where another model of the same name is run: two would speak as one.
+    """
+    for member in speakers(bus).get(model.name, ()):
+        key = bus.keys.rpc(member.service, member.instance, "describe")
+        try:
+            answers = bus.ask(key, Ask(), Description)
+        except RequestRefusedError:
+            continue
+        for answer in answers:
+            if model.hash in answer.body.facts.get("model_hash", "").split(", "):
+                return member
+            raise DeployError(
+                f"{member.instance} runs another model of the name {model.name!r}: stop it, or "
+                "train yours under another name, with --name"
+            )
+    return None
+
+
+def _take_over(bus: Bus, folder: Path, history: History, tell: Callable[[str], None]) -> None:
+    """Let every fixture follow the last model of a history, and write that down."""
+    try:
+        tell(swap.activate(bus, history.deployed[-1].model))
+    except swap.PartlySwappedError:
+        write_history(folder, history)
+        raise
+    write_history(folder, history)
 
 
 def _let_go(control: Control, old: Deployed, tell: Callable[[str], None]) -> None:
-    if old.instance and control.owns(old.instance):
+    if _runs(control, old):
         code = control.stop(old.instance)
         tell(f"{old.instance} stopped with exit code {code}")
 
 
-def _history_file(folder: Path) -> Path:
-    return folder / "deployed.json"
+def _runs(control: Control, deployed: Deployed) -> bool:
+    """Whether it still runs: under its name, but in another `hmcs up`, something else may run."""
+    return bool(deployed.instance) and deployed.path in control.command(deployed.instance)

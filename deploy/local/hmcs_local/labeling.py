@@ -8,9 +8,15 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hmcs.errors import UserError
-from hmcs.recordings.labels import how_labeled, labels_beside, labels_of, write_labels
+from hmcs.recordings.labels import (
+    how_labeled,
+    label_notes,
+    labels_of,
+    write_labels,
+)
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.recordings.stretches import (
     NS_PER_S,
@@ -20,6 +26,7 @@ from hmcs.recordings.stretches import (
     relabeled,
     told,
 )
+from hmcs.shown import plain
 from hmcs.task import Task
 from hmcs.task.model import unknown
 
@@ -39,6 +46,7 @@ def label_recording(
     """
     content = read(file)
     labels: Iterable[Stretch] = () if clear else labels_of(content)
+    notes = [] if clear else list(label_notes(content))
     for item in sets:
         new = _stretch(item, content)
         labels = relabeled(labels, new)
@@ -46,8 +54,11 @@ def label_recording(
     if task is not None:
         _check_names(task, labels, content)
     if sets or clear:
-        write_labels(labels_beside(file), labels, content.first_ns)
+        aside = write_labels(content, labels)
+        notes = [] if aside is None else [f"the labels of another recording are in {aside} now"]
     _show(content, labels, console)
+    for note in notes:
+        console.print(f"note: {plain(note)}", highlight=False, markup=False)
 
 
 def _stretch(item: str, content: RecordingContent) -> Stretch:
@@ -82,11 +93,11 @@ def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingConten
 
 
 def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console) -> None:
-    title = f"{content.path.name}: {content.duration_s:.1f} s"
+    title = f"{plain(content.path.name)}: {content.duration_s:.1f} s"
     if not labels:
-        console.print(f"{title}, no labels: set one by --set BEGIN-END=STATE")
+        console.print(f"{title}, no labels: set one by --set BEGIN-END=STATE", markup=False)
         return
-    table = Table(title=title, title_justify="left")
+    table = Table(title=Text(title), title_justify="left")
     table.add_column("from, s", justify="right")
     table.add_column("to, s", justify="right")
     table.add_column("state")
@@ -94,5 +105,5 @@ def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console
     how = how_labeled(content)
     for label in labels:
         begin_s, end_s = ((at - content.first_ns) / NS_PER_S for at in label[:2])
-        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", label.state, how)
+        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", Text(plain(label.state)), how)
     console.print(table)

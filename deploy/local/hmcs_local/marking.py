@@ -7,6 +7,7 @@ import time
 from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Label, LastSteps, LastStepsQuestion
 from hmcs.bus.session import Bus
+from hmcs.shown import plain
 from hmcs_local.asking import NobodyAnswersError
 
 HEARD_S = 1.0
@@ -16,19 +17,25 @@ HEARD_S = 1.0
 def mark(bus: Bus, state: str) -> str:
     """Say that the hand is in `state` from its next step on; return what was said.
 
-    Raises NobodyAnswersError where nobody listens.
+    Where several input devices make steps it is said from this moment on: which of them is the hand
+    cannot be known. Raises NobodyAnswersError where nobody listens.
     """
     labels = bus.publisher(Label, bus.keys.label)
     key = bus.keys.rpc("input_device", ANY, "last_steps")
-    clock, step = "", 0
-    for answer in bus.ask(key, LastStepsQuestion(count=1), LastSteps)[:1]:
-        clock = answer.body.clock
-        step = answer.body.steps[-1].index + 1 if answer.body.steps else 0
+    answers = bus.ask(key, LastStepsQuestion(count=1), LastSteps)
+    next_steps = {a.body.clock: a.body.steps[-1].index + 1 for a in answers if a.body.steps}
+    if len(next_steps) > 1:
+        label = Label(state=state)
+        since = f"now on, since {len(next_steps)} input devices make steps"
+    else:
+        clock = next(iter(next_steps), answers[0].body.clock if len(answers) == 1 else "")
+        label = Label(state=state, clock=clock, step=next_steps.get(clock, 0))
+        since = f"step {label.step} on"
     deadline_s = time.monotonic() + HEARD_S
     while not labels.matching:
         if time.monotonic() > deadline_s:
             raise NobodyAnswersError("nobody writes it down: start a recorder")
         bus.pump(0.02)
-    labels.put(Label(state=state, clock=clock, step=step))
+    labels.put(label)
     bus.pump(0.05)
-    return f"{state or 'nothing'} from step {step} on"
+    return f"{plain(state) or 'nothing'} from {since}"

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hmcs_local import guard
 
-_LAST_LINES = 12
+LARGEST_LOG_BYTES = 32 * 2**20
+"""A log that has grown beyond this becomes `NAME.log.1`, in place of an older one."""
+SHOWN_AT_ONCE_BYTES = 16 * 2**10
+"""Of what was written between two calls of `new_lines`, only the end is returned if it is more."""
+_LAST_LINES, _LAST_BYTES = 12, 64 * 2**10
 _KILL_WAIT_S = 5.0
 
 
@@ -72,7 +77,9 @@ class StackProcess:
     def send(self, signal_number: int) -> None:
         """Send a signal to it and whatever it started; nothing where it has ended."""
         if self.running:
-            os.killpg(self.pid, signal_number)
+            # Between the look and the signal it may end, or become another user's.
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.pid, signal_number)
 
     def ask_to_stop(self) -> None:
         """Send SIGTERM; also to one that was stopped with SIGSTOP."""
@@ -96,26 +103,62 @@ class StackProcess:
         """Wait until `deadline_s` (monotonic) for its end, then kill it; returns the exit code."""
         if self.wait(deadline_s - time.monotonic()) is None:
             self.kill()
-        return self._popen.wait(_KILL_WAIT_S)
+        code = self.exit_code
+        # One that hangs within the kernel ends once that lets go of it, not now.
+        return -signal.SIGKILL if code is None else code
 
     def kill(self) -> None:
-        """Send SIGKILL and wait for the end."""
+        """Send SIGKILL and wait for the end, some seconds at most."""
         self.send(signal.SIGKILL)
-        self._popen.wait(_KILL_WAIT_S)
+        self.wait(_KILL_WAIT_S)
 
     def new_lines(self) -> list[str]:
-        """Return whole lines written since the last call; all that is left once it ended."""
+        """Return whole lines written since the last call; all that is left once it ended.
+
+        Of more than `SHOWN_AT_ONCE_BYTES` only the end comes, after a line that says so. A log that
+        somebody has removed has no lines.
+        """
         ended = not self.running
-        with self.log_path.open("rb") as log:
-            log.seek(self._read_to)
-            data = log.read()
-        whole = len(data) if ended else data.rfind(b"\n") + 1
-        self._read_to += whole
-        return data[:whole].decode(errors="replace").splitlines()
+        with contextlib.suppress(FileNotFoundError), self.log_path.open("rb") as log:
+            size = log.seek(0, os.SEEK_END)
+            if size < self._read_to:  # cut by somebody
+                self._read_to = self._log_begin = 0
+            left_out = max(0, size - self._read_to - SHOWN_AT_ONCE_BYTES)
+            log.seek(self._read_to + left_out)
+            data = log.read(SHOWN_AT_ONCE_BYTES)
+            first = data.find(b"\n") + 1 if left_out else 0
+            whole = len(data) if ended else data.rfind(b"\n") + 1
+            if whole == 0 and len(data) == SHOWN_AT_ONCE_BYTES:  # a line that never ends
+                whole = len(data)
+            self._read_to += left_out + whole
+            lines = data[first:whole].decode(errors="replace").splitlines()
+            if left_out:
+                lines.insert(
+                    0, f"… {left_out + first} bytes are left out here, see {self.log_path}"
+                )
+            return lines
+        return []
 
     def last_lines(self) -> list[str]:
         """Return the last lines it has written, oldest first."""
-        with self.log_path.open("rb") as log:
-            log.seek(self._log_begin)
-            lines = deque(log, maxlen=_LAST_LINES)
-        return [line.decode(errors="replace").rstrip("\n") for line in lines]
+        with contextlib.suppress(FileNotFoundError), self.log_path.open("rb") as log:
+            size = log.seek(0, os.SEEK_END)
+            log.seek(min(size, max(self._log_begin, size - _LAST_BYTES)))
+            lines = log.read().decode(errors="replace").splitlines()
+            return lines[-_LAST_LINES:]
+        return []
+
+    def bound_log(self) -> bool:
+        """Begin the log anew where it has grown too large; returns whether it had.
+
+        What it held stands in `NAME.log.1` then; a line written at that very moment may be lost.
+        """
+        with contextlib.suppress(FileNotFoundError):
+            if self.log_path.stat().st_size <= LARGEST_LOG_BYTES:
+                return False
+            # The process holds the file itself: it can be emptied, not replaced.
+            shutil.copyfile(self.log_path, self.log_path.with_name(f"{self.log_path.name}.1"))
+            os.truncate(self.log_path, 0)
+            self._read_to = self._log_begin = 0
+            return True
+        return False

@@ -3,33 +3,42 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recordings.exporting import Format, export
 from hmcs.recordings.inspection import Inspection, inspected
-from hmcs.recordings.labels import labels_of
+from hmcs.recordings.labels import label_notes, labels_of
 from hmcs.recordings.plain import BY_SCHEMA
 from hmcs.recordings.reading import RecordingContent, read
+from hmcs.shown import plain
+
+LONGEST_LINE = 4000
+"""Characters of a line; the settings of no process take as many."""
 
 
 def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
     """Show what is in a recording; return whether nothing is missing."""
     content = read(file)
     inspection = inspected(content)
+    problems = (*inspection.problems, *label_notes(content))
     if as_json:
-        console.print(json.dumps(_told(content, inspection)), soft_wrap=True, highlight=False)
-        return not inspection.problems
-    table = Table(title=f"{file.name}: {inspection.duration_s:.1f} s", title_justify="left")
+        told = json.dumps(_told(content, inspection, problems))
+        console.print(told, soft_wrap=True, highlight=False, markup=False)
+        return not problems
+    title = Text(f"{plain(file.name)}: {inspection.duration_s:.1f} s")
+    table = Table(title=title, title_justify="left")
     for name in ("key", "message", "messages", "Hz", "lost", "longest gap, s"):
         table.add_column(name, justify="left" if name in ("key", "message") else "right")
     for channel in inspection.channels:
         table.add_row(
-            "/".join(channel.key.split("/")[3:]),
-            channel.schema,
+            Text(plain("/".join(channel.key.split("/")[3:]))),
+            Text(plain(channel.schema)),
             str(channel.messages),
             f"{channel.rate_hz:.1f}",
             str(channel.lost),
@@ -38,15 +47,15 @@ def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
     console.print(table)
     for name, facts in sorted(content.metadata.items()):
         shown = {key: value for key, value in facts.items() if key != "settings" and value}
-        console.print(f"{name}: " + ", ".join(f"{key} {value}" for key, value in shown.items()))
+        _say(console, f"{name}: " + ", ".join(f"{key} {value}" for key, value in shown.items()))
     labels = _labels(content)
     if labels:
-        console.print(f"labels: {', '.join(labels)}")
+        _say(console, f"labels: {', '.join(labels)}")
     if content.attachments:
-        console.print(f"kept with it: {', '.join(sorted(content.attachments))}")
-    for problem in inspection.problems:
-        console.print(f"missing: {problem}")
-    return not inspection.problems
+        _say(console, f"kept with it: {', '.join(sorted(content.attachments))}")
+    for problem in problems:
+        _say(console, f"missing: {problem}")
+    return not problems
 
 
 def export_recording(file: Path, folder: Path, form: Format, console: Console) -> None:
@@ -54,25 +63,32 @@ def export_recording(file: Path, folder: Path, form: Format, console: Console) -
     content = read(file)
     try:
         for written in export(content, folder, form):
-            console.print(str(written))
+            console.print(str(written), markup=False)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written to: {error.strerror or error}") from error
 
 
-def _told(content: RecordingContent, inspection: Inspection) -> dict[str, object]:
+def _say(console: Console, line: str) -> None:
+    """Print a line in which words from the file stand."""
+    console.print(plain(line, LONGEST_LINE), markup=False, highlight=False)
+
+
+def _told(
+    content: RecordingContent, inspection: Inspection, problems: Sequence[str]
+) -> dict[str, object]:
     return {
         "file": str(content.path),
         "whole": content.whole,
         "duration_s": inspection.duration_s,
         "channels": [channel._asdict() for channel in inspection.channels],
-        "metadata": content.metadata,
+        "metadata": dict(content.metadata),
         "attachments": sorted(content.attachments),
         "labels": _labels(content),
-        "problems": list(inspection.problems),
+        "problems": list(problems),
     }
 
 
 def _labels(content: RecordingContent) -> list[str]:
     """The labeled states in order; none where another version of the contract keeps them unread."""
-    readable = {message.schema for message in content.messages} <= BY_SCHEMA.keys()
+    readable = content.schemas.keys() <= BY_SCHEMA.keys()
     return [label.state for label in labels_of(content)] if readable else []

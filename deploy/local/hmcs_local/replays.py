@@ -14,6 +14,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
+from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recognition.model_file import load_model
@@ -28,6 +29,7 @@ from hmcs.recordings.guiding import Guided, guided
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
+from hmcs.shown import plain
 from hmcs.whole_files import written_whole
 
 DRAWN_AS = (".png", ".svg")
@@ -83,7 +85,7 @@ def replay_in_process(
             begun_ns = content.first_ns
             draw_replay(unfinished, form, replay, fixture, labels_of(content), begun_ns)
     beliefs, fixtures = compared(replay), fixtures_compared(fixture)
-    notes = [*replay.notes, *fixture.notes]
+    notes = [*_degraded(beliefs), *replay.notes, *fixture.notes]
     if as_json:
         told = {
             "model": chosen.name,
@@ -95,11 +97,20 @@ def replay_in_process(
         }
         # JSON has no NaN.
         told = {name: None if value != value else value for name, value in told.items()}
-        console.print(json.dumps(told), soft_wrap=True, highlight=False)
+        console.print(json.dumps(told), soft_wrap=True, highlight=False, markup=False)
     else:
         console.print(_side_by_side(file.name, replay, beliefs, fixtures))
         for note in [*([OPEN_LOOP] if fixture.ticks else []), *notes]:
-            console.print(f"note: {note}", highlight=False)
+            console.print(f"note: {plain(note)}", highlight=False, markup=False)
+
+
+def _degraded(beliefs: Comparison) -> Iterator[str]:
+    """What to tell of steps that were believed without all evidence."""
+    if beliefs.degraded:
+        yield (
+            f"{beliefs.steps} steps, {beliefs.degraded} of them believed without all evidence "
+            "live: they are compared with nothing"
+        )
 
 
 def replay_live(file: Path, rate: float, task: str, router: str, cell: str) -> int:
@@ -118,12 +129,12 @@ def _side_by_side(
     title: str, replay: Replay, beliefs: Comparison, fixtures: FixtureComparison
 ) -> Table:
     """What was and what is, a line a figure; no line for what there is nothing of."""
-    table = Table(
-        title=f"{title}: {beliefs.steps} steps in {replay.lasted_s:.1f} s; recorded "
+    told = (
+        f"{title}: {beliefs.steps} steps in {replay.lasted_s:.1f} s; recorded "
         f"{replay.compared_with or 'nobody'}, replayed {replay.model.name}, "
-        f"{beliefs.times_real:.0f} times as fast",
-        title_justify="left",
+        f"{beliefs.times_real:.0f} times as fast"
     )
+    table = Table(title=Text(plain(told)), title_justify="left")
     table.add_column("", no_wrap=True)
     for name in ("recorded", "replayed", "side by side"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -179,13 +190,15 @@ def _fixture_rows(fixtures: FixtureComparison) -> Iterator[tuple[str, str, str, 
 
 
 def _write_steps(target: Path, replay: Replay, fixture: Guided) -> None:
-    rows = list(rows_of(replay, fixture))
+    rows = rows_of(replay, fixture)
+    first = next(rows)
     with (
         _written(target) as unfinished,
         unfinished.open("w", encoding="utf-8", newline="") as stream,
     ):
-        writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(stream, list(first), lineterminator="\n")
         writer.writeheader()
+        writer.writerow(first)
         writer.writerows(rows)
 
 

@@ -50,6 +50,7 @@ class LocalStack:
     a free port is chosen and `stack.router` tells it. Every volume of compose.yaml is a folder of
     `folder`, which also holds `logs/INSTANCE.log`. `variables` fill in `${NAME}` in compose.yaml
     and default to this process' environment; HMCS_* variables reach the services no other way.
+    `open_to_network` lets the embedded router listen beyond this machine without TLS.
     `while_waiting` is called again and again while a one-shot runs.
 
     Raises ComposeError, StackError and RouterError for what the user can mend, and
@@ -67,6 +68,7 @@ class LocalStack:
         folder: Path = DEFAULT_FOLDER,
         environment: Mapping[str, Mapping[str, str]] | None = None,
         variables: Mapping[str, str] | None = None,
+        open_to_network: bool = False,
         while_waiting: Callable[[], None] = lambda: None,
     ) -> None:
         path = compose or find_compose(Path.cwd())
@@ -84,6 +86,7 @@ class LocalStack:
         self._environment = {name: dict(more) for name, more in (environment or {}).items()}
         for name in self._environment:
             self.spec.service(name)
+        self._open_to_network = open_to_network
         self._while_waiting = while_waiting
         self._asked: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {}
         self._router_session: zenoh.Session | None = None
@@ -138,7 +141,7 @@ class LocalStack:
     def start_router(self) -> None:
         """Start the embedded router; raises RouterError where its port is taken."""
         if self._router_session is None:
-            self._router_session = open_router(self.router)
+            self._router_session = open_router(self.router, open_to_network=self._open_to_network)
 
     def stop_router(self) -> None:
         """Close the embedded router; nothing where there is none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rich.console import Console, Group
@@ -10,9 +11,12 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from hmcs.bus.keys import Member
 from hmcs.bus.messages import Health
 from hmcs.bus.session import Bus
-from hmcs_local.observer import Sighting, look
+from hmcs.shown import plain
+from hmcs_local.asking import left_out
+from hmcs_local.observer import Observation, Sighting, observe
 
 NOBODY = "nobody is there: bring the stack up with `hmcs up`"
 
@@ -50,10 +54,7 @@ class Row(NamedTuple):
 
 def row(now: Sighting, before: Sighting | None) -> Row:
     """Return a process' line; over its whole life where `before` is None or of another boot."""
-    service, process = now.member
-    if not process.startswith(service.replace("_", "-")):
-        process = f"{service}/{process}"
-    health = now.health
+    process, health = _name(now.member), now.health
     if health is None:
         return Row(process, False, "present, but does not answer", 0, 0, 0, 0, 0, 0, 0)
     same_life = before is not None and before.boot == now.boot
@@ -62,7 +63,7 @@ def row(now: Sighting, before: Sighting | None) -> Row:
     return Row(
         process=process,
         healthy=health.healthy,
-        detail=health.detail,
+        detail=plain(health.detail),
         received_hz=(_total(health.received) - _total(then.received)) / seconds,
         sent_hz=(_total(health.sent) - _total(then.sent)) / seconds,
         lost=_total(health.lost),
@@ -73,40 +74,89 @@ def row(now: Sighting, before: Sighting | None) -> Row:
     )
 
 
-def active_model(sightings: list[Sighting]) -> str:
-    """Return the model whose belief the fixture follows; empty while none is known."""
-    return next((s.facts["active_model"] for s in sightings if s.facts.get("active_model")), "")
+def active_model(sightings: Iterable[Sighting]) -> str:
+    """Return the models whose beliefs fixtures follow, one as a rule; empty while none is known."""
+    return ", ".join(sorted({model for _, model in _followed(sightings)}))
+
+
+def remarks(now: Observation, before: Observation | None) -> list[str]:
+    """Return what is wrong though every process may be well: one line each.
+
+    `before` is an earlier look: who spoke for a model then is named where nobody does now.
+    """
+    told = []
+    for fixture, model in _followed(now.sightings):
+        if not now.speakers.get(model):
+            went = before.speakers.get(model, ()) if before else ()
+            gone = f": {', '.join(map(_name, went))} went while it was active" if went else ""
+            running = ", ".join(now.speakers) or "none"
+            told.append(
+                f"{_name(fixture)} follows {plain(model)}, but nobody runs it{gone} "
+                f"(models that are run: {running})"
+            )
+    return told
 
 
 def show_status(bus: Bus, console: Console, *, once: bool) -> bool:
     """Show the table, anew every second until Ctrl-C; with `once`, after two looks.
 
-    Returns whether somebody is there and everybody is healthy.
+    Returns whether somebody is there, everybody is healthy and every model that is followed is run.
     """
-    sightings = look(bus)
+    before, now = None, observe(bus)
     if once:
-        before, sightings = sightings, _look_again(bus, _LOOK_EVERY_S / 2)
-        console.print(_picture(bus, sightings, before, console.width))
-        return bool(sightings) and all(s.health and s.health.healthy for s in sightings)
-    first = _picture(bus, sightings, [], console.width)
-    with Live(first, console=console, auto_refresh=False) as live:
+        before, now = now, _look_again(bus, _LOOK_EVERY_S / 2)
+        console.print(_picture(bus, now, before, console.width))
+        well = all(s.health and s.health.healthy for s in now.sightings)
+        return bool(now.sightings) and well and not remarks(now, before)
+    with Live(_picture(bus, now, None, console.width), console=console, auto_refresh=False) as live:
         while True:  # until Ctrl-C
-            before, sightings = sightings, _look_again(bus, _LOOK_EVERY_S)
-            live.update(_picture(bus, sightings, before, console.width), refresh=True)
+            before, now = now, _look_again(bus, _LOOK_EVERY_S)
+            live.update(_picture(bus, now, before, console.width), refresh=True)
+            now = remembering(now, before)
 
 
-def _look_again(bus: Bus, after_s: float) -> list[Sighting]:
+def _look_again(bus: Bus, after_s: float) -> Observation:
     until_s = time.monotonic() + after_s
     while (left_s := until_s - time.monotonic()) > 0:
         bus.pump(left_s)
-    return look(bus)
+    return observe(bus)
 
 
-def _picture(bus: Bus, sightings: list[Sighting], before: list[Sighting], width: int) -> Group:
+def remembering(now: Observation, before: Observation) -> Observation:
+    """Return a look that still knows who spoke last for each model that is followed.
+
+    So that `remarks` can name them as long as nobody else runs that model.
+    """
+    kept = {
+        model: before.speakers.get(model, ())
+        for _, model in _followed(now.sightings)
+        if not now.speakers.get(model)
+    }
+    return now._replace(speakers={**now.speakers, **kept})
+
+
+def _followed(sightings: Iterable[Sighting]) -> list[tuple[Member, str]]:
+    """Return each fixture that follows a model, and which."""
+    return [
+        (s.member, s.facts["active_model"])
+        for s in sightings
+        if s.member.service == "fixture_controller" and s.facts.get("active_model")
+    ]
+
+
+def _name(member: Member) -> str:
+    """How a process is called on the screen."""
+    service, process = member
+    return process if process.startswith(service.replace("_", "-")) else f"{service}/{process}"
+
+
+def _picture(bus: Bus, now: Observation, before: Observation | None, width: int) -> Group:
+    sightings = now.sightings
     where = Text(f"cell {bus.settings.cell} on {bus.settings.router}")
-    where.append(f", active model {active_model(sightings) or 'none'}")
+    where.append(f", active model {plain(active_model(sightings)) or 'none'}")
+    strangers = [Text(line, "yellow") for line in [left_out(now.strangers)] if line]
     if not sightings:
-        return Group(where, Text(NOBODY, style="yellow"))
+        return Group(where, Text(NOBODY, style="yellow"), *strangers)
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("process", no_wrap=True)
     table.add_column("")
@@ -114,23 +164,22 @@ def _picture(bus: Bus, sightings: list[Sighting], before: list[Sighting], width:
         table.add_column(name, justify="right", no_wrap=True)
     if width >= _WIDTH_FOR_DETAILS:
         table.add_column("detail")
-    earlier = {s.member: s for s in before}
-    lines = [row(sighting, earlier.get(sighting.member)) for sighting in sightings]
+    earlier = {(s.member, s.boot): s for s in before.sightings} if before else {}
+    lines = [row(s, earlier.get((s.member, s.boot))) for s in sightings]
     for line in lines:
         table.add_row(
-            line.process,
+            Text(line.process),
             Text("ok", style="green") if line.healthy else Text("ill", style="red"),
             f"{line.received_hz:.0f}",
             f"{line.sent_hz:.0f}",
             *(_count(count) for count in (line.lost, line.refused, line.late)),
             f"{line.cpu_percent:.0f}",
             f"{line.uptime_s:.0f}",
-            *([line.detail] if width >= _WIDTH_FOR_DETAILS else []),
+            *([Text(line.detail)] if width >= _WIDTH_FOR_DETAILS else []),
         )
-    if width >= _WIDTH_FOR_DETAILS:
-        return Group(where, table)
-    ill = [Text(f"{line.process}: {line.detail}") for line in lines if not line.healthy]
-    return Group(where, table, *ill)
+    ill = [f"{line.process}: {line.detail}" for line in lines if not line.healthy]
+    wrong = [*(ill if width < _WIDTH_FOR_DETAILS else []), *remarks(now, before)]
+    return Group(where, table, *(Text(line, "red") for line in wrong), *strangers)
 
 
 def _count(count: int) -> Text:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
 from hmcs.bus.messages import ActivateRecognizer, LoadModel, Message
+from hmcs.bus.presence import present
 from hmcs.bus.session import Bus
 from hmcs.errors import UserError
-from hmcs_local.asking import NobodyAnswersError, asked_of
-from hmcs_local.control import Control
-
-CLASSIFIER = "gesteme_classifier"
-"""The only service that may run twice at a time without harm, so that one can take over."""
+from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of
+from hmcs_local.control import Control, ControlError
+from hmcs_local.interrupts import uninterrupted
+from hmcs_local.observer import CLASSIFIER, speakers
 
 _LOOK_EVERY_S = 0.05
 
@@ -22,15 +23,26 @@ class SwapError(UserError):
     """A swap that was not made; what ran before runs on."""
 
 
+class PartlySwappedError(SwapError):
+    """A swap that some fixtures have made, and others have not answered to."""
+
+
 def activate(bus: Bus, model: str) -> str:
     """Let the fixture follow the belief of recognizer `model`; returns what the fixture answers.
 
-    Raises SwapError where no fixture controller is there, or where it refuses.
+    Raises SwapError where nobody runs that recognizer, no fixture controller is there, or one
+    refuses; PartlySwappedError where some follow it and others do not answer.
     """
     try:
         check_name("model", model)
     except KeyNameError as error:
         raise SwapError(str(error)) from None
+    running = speakers(bus)
+    if model not in running:
+        raise SwapError(
+            f"nobody runs a recognizer of {model!r} in cell {bus.settings.cell}, so it would "
+            f"assist nobody: start it first. Those that are run: {', '.join(running) or 'none'}"
+        )
     return _asked_of_fixtures(bus, "activate", ActivateRecognizer(model=model))
 
 
@@ -45,6 +57,8 @@ def load(bus: Bus, path: str) -> str:
 def _asked_of_fixtures(bus: Bus, verb: str, question: Message) -> str:
     try:
         return asked_of(bus, "fixture_controller", verb, question)
+    except PartlyAnsweredError as error:
+        raise PartlySwappedError(str(error)) from None
     except NobodyAnswersError as error:
         raise SwapError(str(error)) from None
 
@@ -76,13 +90,44 @@ def replace_classifier(
             f"{instance} was not started by the `hmcs up` of this folder: start its replacement "
             "where it belongs, wait until `hmcs status` shows it, then stop the old one"
         )
-    newcomer = control.start("gesteme-classifier", command)
-    tell(f"{newcomer} started; {instance} goes on until it is ready")
-    until_ready(bus, control, newcomer, lambda: newcomer in _members(bus), ready_within_s, instance)
+    with started(control, "gesteme-classifier", command, tell=tell) as newcomer:
+        tell(f"{newcomer} started; {instance} goes on until it is ready")
+        until_ready(
+            bus, control, newcomer, lambda: newcomer in _members(bus), ready_within_s, instance
+        )
     tell(f"{newcomer} has replayed and is ready")
     code = control.stop(instance)
     tell(f"{instance} stopped with exit code {code}")
     return newcomer
+
+
+@contextmanager
+def started(
+    control: Control,
+    service: str,
+    command: Sequence[str] | None = None,
+    *,
+    keep: Callable[[], bool] = lambda: False,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Iterator[str]:
+    """Start a process and yield its name; where the block fails, whatever by, stop it again.
+
+    It goes on nevertheless where `keep` then says that it is needed. Raises SwapError where it
+    cannot be stopped, and ControlError where it cannot be started.
+    """
+    instance, interrupted = uninterrupted(lambda: control.start(service, command))
+    try:
+        if interrupted:
+            raise KeyboardInterrupt
+        yield instance
+    except BaseException as error:
+        if not keep():
+            try:
+                control.stop(instance)
+            except ControlError as unstopped:
+                raise SwapError(f"{error}; {instance} could not be stopped: {unstopped}") from error
+            tell(f"{instance} is stopped again")
+        raise
 
 
 def until_ready(
@@ -95,20 +140,18 @@ def until_ready(
 ) -> None:
     """Wait until a process that was started is ready.
 
-    Raises SwapError, which says that `old` goes on, where it ends or is not ready in time; it is
-    stopped then.
+    Raises SwapError, which says that `old` goes on, where it ends or is not ready in time.
     """
     deadline_s = time.monotonic() + within_s
     while not is_ready():
         if time.monotonic() > deadline_s or not control.owns(newcomer):
-            control.stop(newcomer)
             raise SwapError(
-                f"{newcomer} was not ready within {within_s:g} s and was stopped; "
+                f"{newcomer} was not ready within {within_s:g} s and is stopped; "
                 f"{old} goes on. Its log says why: {newcomer}.log"
             )
         bus.pump(_LOOK_EVERY_S)
 
 
 def _members(bus: Bus) -> set[str]:
-    keys = bus.keys
-    return {keys.member_of(key).instance for key in bus.alive(keys.member(ANY, CLASSIFIER))}
+    there = present(bus.keys, bus.alive(bus.keys.member(ANY, CLASSIFIER)))
+    return {member.instance for member in there.members}

@@ -6,9 +6,11 @@ import os
 import subprocess
 import sys
 import textwrap
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,16 @@ import psutil
 import pytest
 import yaml
 
+from hmcs.bus.config import BusSettings
+from hmcs.bus.messages import (
+    ActivateRecognizer,
+    Ask,
+    Description,
+    Done,
+    Health,
+    LoadModel,
+)
+from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs_local.command import main
 from hmcs_local.control import ControlServer
 from hmcs_local.stack import LocalStack
@@ -75,6 +87,92 @@ def classifier(service: Callable[..., dict[str, Any]]) -> dict[str, Any]:
     """A fake gesteme classifier: on the bus, ready at once, publishing nothing."""
     environment = {"HMCS_ROUTER": "tcp/router:7447", "HMCS_CELL": "fake"}
     return service(FAKE_CLASSIFIER, environment=environment)
+
+
+class Fixture:
+    """A fixture controller that does what it is told, or refuses; `asked` is what it was."""
+
+    def __init__(self, active: str = "") -> None:
+        self.active = active
+        self.refuses = False
+        self.answers_after_s = 0.0
+        self.asked: list[str] = []
+
+    def load(self, question: LoadModel) -> Done:
+        self.asked.append(f"load {question.path}")
+        return Done(detail="loaded")
+
+    def activate(self, question: ActivateRecognizer) -> Done:
+        self.asked.append(f"activate {question.model}")
+        if self.refuses:
+            raise RequestRefusedError("not now")
+        self.active = question.model
+        time.sleep(self.answers_after_s)
+        return Done(detail=f"follows {question.model}")
+
+    def describe(self, _: Ask) -> Description:
+        return Description(
+            version="1",
+            publishes=(),
+            subscribes=(),
+            answers=(),
+            facts={"active_model": self.active},
+        )
+
+    @contextmanager
+    def live(self, router: str, cell: str, instance: str = "f") -> Iterator[None]:
+        """Be there, as a process of its own would."""
+        over = threading.Event()
+        settings = BusSettings(router=router, cell=cell)
+        with Bus.open(settings, "fixture_controller", instance) as bus:
+            bus.answer("load_model", LoadModel, self.load)
+            bus.answer("activate", ActivateRecognizer, self.activate)
+            bus.answer("describe", Ask, self.describe)
+            bus.answer("health", Ask, lambda _: WELL)
+            bus.announce(bus.keys.presence("fixture_controller", instance))
+
+            def pump() -> None:
+                while not over.is_set():
+                    bus.pump(0.01)
+
+            thread = threading.Thread(target=pump)
+            thread.start()
+            try:
+                yield
+            finally:
+                over.set()
+                thread.join()
+
+
+WELL = Health(
+    healthy=True,
+    detail="running",
+    uptime_s=10.0,
+    loop_rate_hz=100.0,
+    cpu_s=1.0,
+    received={},
+    sent={},
+    lost={},
+    refused={},
+    late={},
+)
+
+
+@pytest.fixture
+def fixture_controller(
+    eventually: Callable[[Callable[[], Any]], Any],
+) -> Iterator[Callable[..., Fixture]]:
+    """Bring up fixture controllers that are seen by a bus, until the test ends."""
+    with ExitStack() as up:
+
+        def bring_up(bus: Bus, active: str = "", instance: str = "f") -> Fixture:
+            fixture = Fixture(active)
+            up.enter_context(fixture.live(bus.settings.router, bus.settings.cell, instance))
+            presence = bus.keys.presence("fixture_controller", instance)
+            eventually(lambda: bus.alive(presence))
+            return fixture
+
+        yield bring_up
 
 
 @pytest.fixture

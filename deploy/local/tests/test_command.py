@@ -170,6 +170,38 @@ def test_a_mistake_is_one_message_and_exit_code_2(
     assert complaint in mistake(hmcs(*words))
 
 
+def test_nothing_is_opened_to_the_network_unless_it_is_asked_for(
+    up: Callable[..., Any],
+    hmcs: Run,
+    write_compose: Callable[..., Path],
+    service: Describe,
+) -> None:
+    write_compose(a=service())
+    for words in (["up", "--router"], ["router", "--listen"]):
+        said = mistake(hmcs(*words, "tcp/0.0.0.0:0"))
+        assert "everybody who reaches it can move the robot" in said
+        assert "--open-to-network" in said
+        assert "can move the robot" in " ".join(hmcs(words[0], "--help").stdout.split())
+    launcher, _ = up("--router", "tcp/0.0.0.0:0", "--open-to-network")
+    listening = psutil.Process(launcher.pid).net_connections("tcp")
+    assert "0.0.0.0" in {each.laddr.ip for each in listening if each.status == "LISTEN"}
+
+
+def test_what_a_terminal_cannot_show_is_shown_otherwise(
+    environment: dict[str, str], tmp_path: Path
+) -> None:
+    done = subprocess.run(
+        [*HMCS, "task", "check", "nö-tåsk.yaml"],
+        cwd=tmp_path,
+        env={**environment, "PYTHONIOENCODING": "ascii:strict"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert r"n\xf6-t\xe5sk.yaml" in mistake(done)
+
+
 def test_an_unknown_option_ends_with_2(hmcs: Run) -> None:
     done = hmcs("up", "--no-such-option")
     assert done.returncode == 2

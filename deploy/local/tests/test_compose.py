@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from hmcs_local.compose import ComposeError, find_compose, load_compose
 
@@ -93,3 +95,13 @@ def test_the_stack_of_this_checkout_can_be_run() -> None:
     assert next(iter(stack.services)) == "router"
     assert stack.services["gesteme-classifier"].scale == 2
     assert [name for name, spec in stack.services.items() if spec.one_shot] == ["teach"]
+
+
+def test_every_port_of_the_stack_is_reached_from_this_machine_alone_by_default() -> None:
+    document = yaml.safe_load(find_compose(Path(__file__).parent).read_text(encoding="utf-8"))
+    ports = [
+        re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", port)
+        for service in document["services"].values()
+        for port in service.get("ports", [])
+    ]
+    assert sorted(ports) == ["127.0.0.1:7447:7447", "127.0.0.1:8080:8080"]

@@ -14,6 +14,7 @@ import pytest
 
 from hmcs.bus.router import RouterError
 from hmcs.errors import UserError
+from hmcs_local import processes
 from hmcs_local.stack import LocalStack, OneShotFailedError, StackError
 
 Describe = Callable[..., dict[str, Any]]
@@ -80,6 +81,28 @@ def test_a_hung_process_ends_with_the_stack(
         stack.kill("a", signal_number=signal.SIGSTOP)
         assert process.running
     assert process.exit_code == -signal.SIGTERM
+
+
+def test_one_that_even_sigkill_does_not_end_keeps_no_other_running(
+    write_compose: WriteCompose,
+    service: Describe,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(processes, "_KILL_WAIT_S", 0.1)
+    path = write_compose(a=service(stop_grace_period="10ms"), b=service())
+    stack = LocalStack(path, router=FREE, folder=tmp_path)
+    stack.start_all()
+    stuck, other = stack.processes["a-1"], stack.processes["b-1"]
+    send = stuck.send
+    monkeypatch.setattr(stuck, "send", lambda _: None)
+    try:
+        assert stack.stop_all() == {"a-1": -signal.SIGKILL, "b-1": -signal.SIGTERM}
+        assert not other.running
+        assert stuck.running
+    finally:
+        send(signal.SIGKILL)
+        stuck.wait(10)
 
 
 def test_what_a_service_started_ends_with_it(

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
 import io
-import logging
-import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -12,12 +10,10 @@ from rich.console import Console
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Health
 from hmcs.bus.router import open_router
-from hmcs.bus.service import Service, serve
-from hmcs.bus.session import Bus, BusSettings
-from hmcs.bus.settings import ServiceSettings
-from hmcs_local.observer import Sighting, look, open_observer
+from hmcs.bus.session import Bus, Token
+from hmcs_local.observer import Sighting, observe, open_observer
 from hmcs_local.stack import with_free_port
-from hmcs_local.status import active_model, row, show_status
+from hmcs_local.status import active_model, remarks, remembering, row, show_status
 
 Eventually = Callable[[Callable[[], Any]], Any]
 
@@ -69,44 +65,111 @@ def test_the_active_model_is_what_the_fixture_says() -> None:
     assert active_model([sighting()]) == ""
 
 
-class Fixture(Service):
-    """A service that does nothing but say which model is active."""
-
-    name = "fixture_controller"
-
-    def facts(self) -> dict[str, str]:
-        return {"active_model": "mine"}
-
-
-def test_the_table_shows_who_is_there(eventually: Eventually) -> None:
+@pytest.fixture
+def bus() -> Iterator[Bus]:
     router = with_free_port("tcp/127.0.0.1:0")
-    over = threading.Event()
-
-    def live() -> None:
-        settings = BusSettings(router=router, cell="demo")
-        with Bus.open(settings, "fixture_controller", "f", stopping=over.is_set) as bus:
-            serve(
-                Fixture,
-                ServiceSettings(router=router),
-                bus,
-                logging.getLogger("test"),
-                over.is_set,
-            )
-
     with open_router(router), open_observer(router, "demo") as bus:
-        console = Console(file=io.StringIO(), width=160)
-        assert not show_status(bus, console, once=True)
-        thread = threading.Thread(target=live)
-        thread.start()
-        try:
-            eventually(lambda: look(bus))
-            assert show_status(bus, console, once=True)
-        finally:
-            over.set()
-            thread.join()
-        file = console.file
-        assert isinstance(file, io.StringIO)
-        nobody, _, table = file.getvalue().partition("hmcs up")
-        assert "nobody is there" in nobody
-        assert "active model mine" in table
-        assert "fixture_controller/f" in table
+        yield bus
+
+
+def shown(bus: Bus, width: int = 160) -> tuple[bool, str]:
+    """Return whether all is well, and the table."""
+    file = io.StringIO()
+    well = show_status(bus, Console(file=file, width=width), once=True)
+    return well, file.getvalue()
+
+
+def run(bus: Bus, model: str) -> Token:
+    """Show that somebody speaks for a model."""
+    return bus.announce(bus.keys.member(model, "my_recognizer", "r"))
+
+
+def test_the_table_shows_who_is_there(
+    bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
+) -> None:
+    well, table = shown(bus)
+    assert not well
+    assert "nobody is there: bring the stack up with `hmcs up`" in table
+    fixture_controller(bus, active="mine")
+    run(bus, "mine")
+    eventually(lambda: observe(bus).speakers)
+    well, table = shown(bus)
+    assert well
+    assert "active model mine" in table
+    assert "fixture_controller/f" in table
+    assert "nobody runs" not in table
+
+
+@pytest.mark.parametrize("width", [80, 160])
+def test_that_nobody_runs_the_active_model_is_said_and_is_not_well(
+    bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually, width: int
+) -> None:
+    fixture_controller(bus, active="mine")
+    run(bus, "other")
+    bus.announce(bus.keys.member("mine", "gesteme_classifier", "c"))
+    eventually(lambda: observe(bus).speakers)
+    well, table = shown(bus, width)
+    told = " ".join(table.split())
+    assert "follows mine, but nobody runs it (models that are run: other)" in told
+    assert not well
+
+
+def test_who_went_while_its_model_was_active_is_named_as_long_as_nobody_else_runs_it(
+    bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
+) -> None:
+    fixture_controller(bus, active="mine")
+    token = run(bus, "mine")
+    eventually(lambda: observe(bus).speakers)
+    before = observe(bus)
+    assert remarks(before, None) == []
+    token.withdraw()
+    eventually(lambda: not observe(bus).speakers)
+    for _ in range(3):
+        now = observe(bus)
+        (remark,) = remarks(now, before)
+        assert "nobody runs it: my_recognizer/r went while it was active" in remark
+        before = remembering(now, before)
+    run(bus, "mine")
+    eventually(lambda: observe(bus).speakers)
+    assert remarks(observe(bus), before) == []
+
+
+def test_every_model_that_a_fixture_follows_is_named(
+    bus: Bus, fixture_controller: Callable[..., Any]
+) -> None:
+    fixture_controller(bus, active="mine", instance="f")
+    fixture_controller(bus, active="yours", instance="g")
+    well, table = shown(bus)
+    assert "active model mine, yours" in table
+    assert "fixture_controller/f follows mine, but nobody runs it" in table
+    assert "fixture_controller/g follows yours, but nobody runs it" in table
+    assert not well
+
+
+def test_two_processes_of_one_name_are_two_lines(
+    bus: Bus, fixture_controller: Callable[..., Any]
+) -> None:
+    fixture_controller(bus)
+    fixture_controller(bus)
+    assert shown(bus)[1].count("fixture_controller/f") == 2
+
+
+@pytest.mark.parametrize("name", ["evil name", "\x1b[2J\x1b]0;x\x07", "n" * 300, "[red]"])
+def test_tokens_nobody_can_bear_are_counted_shown_harmlessly_and_make_nobody_ill(
+    bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually, name: str
+) -> None:
+    fixture_controller(bus)
+    presence = bus.keys.presence("robot", "x").removesuffix("x")
+    bus.announce(f"{presence}{name}")
+    bus.announce(bus.keys.member("mine", "recognizer", "x").removesuffix("x") + name)
+    eventually(lambda: len(observe(bus).strangers) == 2)
+    well, table = shown(bus)
+    assert well
+    assert "no process can bear such a name (2): 'presence/robot/" in " ".join(table.split())
+    assert table.replace("\n", "").isprintable()
+
+
+def test_what_a_process_says_of_itself_is_text() -> None:
+    said = "[red]\x1b[2Jgone\u202e[/nonsense]"
+    line = row(sighting(detail=said), None)
+    assert line.detail == "[red]\\x1b[2Jgone\\u202e[/nonsense]"

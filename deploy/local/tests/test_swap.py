@@ -1,19 +1,19 @@
 from __future__ import annotations
 
-import threading
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from hmcs.bus.messages import ActivateRecognizer, Done
 from hmcs.bus.router import open_router
-from hmcs.bus.session import Bus, RequestRefusedError
-from hmcs_local.control import Control
-from hmcs_local.observer import open_observer
+from hmcs.bus.session import Bus
+from hmcs_local import swap
+from hmcs_local.control import Control, ControlError
+from hmcs_local.observer import open_observer, speakers
 from hmcs_local.stack import LocalStack, with_free_port
-from hmcs_local.swap import SwapError, activate, replace_classifier
+from hmcs_local.swap import PartlySwappedError, SwapError, activate, replace_classifier
 
 Eventually = Callable[[Callable[[], Any]], Any]
 Served = Callable[[LocalStack, Callable[[], Any]], Any]
@@ -97,35 +97,115 @@ def empty_bus() -> Iterator[Bus]:
         yield bus
 
 
-def test_a_recognizer_is_activated_by_the_fixture_controller(
-    empty_bus: Bus, eventually: Eventually
+def run(bus: Bus, model: str, service: str = "recognizer", instance: str = "r") -> None:
+    """Show that a process works for a model."""
+    bus.announce(bus.keys.member(model, service, instance))
+
+
+def test_a_recognizer_is_activated_by_every_fixture_controller(
+    empty_bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
 ) -> None:
     bus = empty_bus
+    run(bus, "other")
+    eventually(lambda: "other" in speakers(bus))
     with pytest.raises(SwapError, match="no fixture controller"):
         activate(bus, "other")
-    over = threading.Event()
+    fixture = fixture_controller(bus)
+    assert activate(bus, "other") == "follows other"
+    second = fixture_controller(bus, instance="g")
+    assert activate(bus, "other") == "f: follows other; g: follows other"
+    assert fixture.active == second.active == "other"
+    fixture.refuses = True
+    with pytest.raises(SwapError, match="f: refused: not now; g: follows other"):
+        activate(bus, "other")
+    with pytest.raises(SwapError, match="cannot be part of a key"):
+        activate(bus, "a/b")
 
-    def answer(asked: ActivateRecognizer) -> Done:
-        if asked.model == "other":
-            return Done(detail="following other")
-        raise RequestRefusedError(f"no recognizer {asked.model!r}")
 
-    def fixture_controller() -> None:
-        with Bus.open(bus.settings, "fixture_controller", "f") as mine:
-            mine.answer("activate", ActivateRecognizer, answer)
-            mine.announce(mine.keys.presence("fixture_controller", "f"))
-            while not over.is_set():
-                mine.pump(0.02)
+def test_a_recognizer_that_nobody_runs_is_refused_and_those_that_are_run_are_named(
+    empty_bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
+) -> None:
+    bus, fixture = empty_bus, fixture_controller(empty_bus)
+    with pytest.raises(SwapError, match=r"nobody runs .*'other'.*Those that are run: none"):
+        activate(bus, "other")
+    run(bus, "mine")
+    run(bus, "human-shapes", "task_hmm")
+    run(bus, "no-belief", "gesteme_classifier")
+    bus.announce(bus.keys.member("other", "recognizer", "x").removesuffix("x") + "evil name")
+    eventually(lambda: len(bus.alive(bus.keys.member("*"))) == 4)
+    for name in ("other", "no-belief"):
+        with pytest.raises(SwapError, match=r"Those that are run: human-shapes, mine$"):
+            activate(bus, name)
+    assert fixture.asked == []
 
-    thread = threading.Thread(target=fixture_controller)
-    thread.start()
-    try:
-        eventually(lambda: bus.alive(bus.keys.presence("fixture_controller")))
-        assert activate(bus, "other") == "following other"
-        with pytest.raises(SwapError, match="f: no recognizer 'nonesuch'"):
-            activate(bus, "nonesuch")
-        with pytest.raises(SwapError, match="cannot be part of a key"):
-            activate(bus, "a/b")
-    finally:
-        over.set()
-        thread.join()
+
+def test_a_fixture_that_does_not_answer_keeps_no_other_from_following(
+    empty_bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
+) -> None:
+    bus, fixture = empty_bus, fixture_controller(empty_bus)
+    run(bus, "other")
+    bus.announce(bus.keys.presence("fixture_controller", "a-ghost"))
+    eventually(lambda: len(bus.alive(bus.keys.presence())) == 2)
+    eventually(lambda: "other" in speakers(bus))
+    with pytest.raises(PartlySwappedError, match=r"a-ghost: did not answer.*f: follows other"):
+        activate(bus, "other")
+    assert fixture.active == "other"
+
+
+@pytest.mark.parametrize("how", [KeyboardInterrupt, SwapError, SystemExit, RuntimeError])
+def test_a_newcomer_goes_again_whatever_keeps_it_from_taking_over(
+    stack: LocalStack,
+    bus: Bus,
+    served: Served,
+    monkeypatch: pytest.MonkeyPatch,
+    how: type[BaseException],
+) -> None:
+    def fail(*_: Any) -> None:
+        raise how("at this very moment")
+
+    monkeypatch.setattr(swap, "until_ready", fail)
+    told: list[str] = []
+
+    def replace() -> str:
+        try:
+            return replace_classifier(bus, Control(stack.folder), OLD, tell=told.append)
+        except BaseException as error:  # of a thread, none gets through
+            return type(error).__name__
+
+    assert served(stack, replace) == how.__name__
+    assert running(stack) == [OLD]
+    assert told[-1] == "gesteme-classifier-2 is stopped again"
+
+
+def test_an_interrupt_while_a_process_is_being_started_stops_it_again(
+    stack: LocalStack,
+) -> None:
+    stopped = []
+
+    class Interrupted(Control):
+        def start(self, service: str, command: object = None) -> str:
+            signal.raise_signal(signal.SIGINT)
+            return f"{service}-7"
+
+        def stop(self, instance: str) -> int:
+            stopped.append(instance)
+            return 0
+
+    with pytest.raises(KeyboardInterrupt), swap.started(Interrupted(stack.folder), "a"):
+        pytest.fail("it goes on")
+    assert stopped == ["a-7"]
+
+
+def test_what_cannot_be_stopped_again_is_told(stack: LocalStack) -> None:
+    class Deaf(Control):
+        def start(self, service: str, command: object = None) -> str:
+            return f"{service}-7"
+
+        def stop(self, instance: str) -> int:
+            raise ControlError("no answer")
+
+    with (
+        pytest.raises(SwapError, match=r"no motion; a-7 could not be stopped: no answer"),
+        swap.started(Deaf(stack.folder), "a"),
+    ):
+        raise SwapError("no motion")

@@ -16,14 +16,22 @@ M = TypeVar("M", bound=Message)
 _AT_ONCE = 2
 WAITING = 8
 """So many requests may wait for what comes of them; a hand does not get that far."""
+_MOST_ASKED = 32
+"""So many other questions may wait for their turn or their answers; of more only a process that
+comes and goes all the time makes some."""
 
 
 class Asking:
     """Asks, and keeps what comes of it until `take` is called on the bus' own thread."""
 
-    def __init__(self, bus: Bus, at_once: int = _AT_ONCE) -> None:
-        """Ask so many questions at once; the others wait for their turn."""
+    def __init__(self, bus: Bus, at_once: int = _AT_ONCE, waiting: int = WAITING) -> None:
+        """Ask so many questions at once; the others wait for their turn.
+
+        Of `waiting` requests that wait for an answer another one is refused.
+        """
         self._bus = bus
+        self._most_waiting = waiting
+        self._asked = 0
         self._pool = ThreadPoolExecutor(at_once, thread_name_prefix="asking")
         self._come: deque[Callable[[], None]] = deque()
         self._waiting = 0
@@ -38,17 +46,26 @@ class Asking:
         timeout_s: float = 1.0,
     ) -> None:
         """Ask whoever answers on `key`; hand the answers, or the refusal, on with `take`."""
+        most = self._most_waiting + _MOST_ASKED
+        if self._asked == most:
+            refused(f"{most} questions wait for an answer: wait for one before the next")
+            return
+        self._asked += 1
 
         def work() -> None:
             try:
                 answers = self._bus.ask(key, question, answer_type, timeout_s)
+            except StoppedError:
+                return
             except RequestRefusedError as error:
                 reason = str(error)
-                self._come.append(lambda: refused(reason))
-            except StoppedError:
-                pass
+            except Exception as error:
+                # Whatever the wire does, who asked is told and the next question is asked.
+                reason = f"it could not be asked: {type(error).__name__}: {error}"
             else:
                 self._come.append(lambda: then(answers))
+                return
+            self._come.append(lambda: refused(reason))
 
         self._pool.submit(work)
 
@@ -66,8 +83,9 @@ class Asking:
         `failed` is told why it was not done, where it was not; by default `done` is.
         """
         failed = failed or done
-        if self._waiting == WAITING:
-            failed(f"{WAITING} requests wait for an answer: wait for one before the next")
+        if self._waiting == self._most_waiting:
+            most = self._most_waiting
+            failed(f"{most} requests wait for an answer: wait for one before the next")
             return
         self._waiting += 1
 
@@ -88,7 +106,9 @@ class Asking:
     def take(self) -> None:
         """Hand on what has come."""
         while self._come:
-            self._come.popleft()()
+            come = self._come.popleft()
+            self._asked -= 1
+            come()
 
     def close(self) -> None:
         """Wait for what is being asked; ask nothing more."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -27,14 +26,16 @@ from hmcs.fixtures.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped
-from hmcs_console.operating.hands import Hands
+from hmcs_console.operating.hands import FLOOD, Hands
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
+from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
+from hmcs_console.seeing.presence import MOST_TOKENS, Presence
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.gateway import Gateway
+from hmcs_console.serving.gateway import Gateway, Served, encryption
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
@@ -71,7 +72,8 @@ class Console(Service):
         self._labels = bus.publisher(Label, bus.keys.label)
         self._asking = Asking(bus)
         self._stopping = Stopping(bus)
-        self._swapping = Swapping(self._seen, self._request, settings.compare_s)
+        self._requesting = Requesting(bus, self._seen, self._asking)
+        self._swapping = Swapping(self._seen, self._requesting.request, settings.compare_s)
         self.recordings = Recordings(
             self._asking,
             bus.keys,
@@ -87,17 +89,16 @@ class Console(Service):
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
-        token = settings.token.get_secret_value() if settings.token is not None else None
         try:
             self._gateway = Gateway(
-                settings.host, settings.port, self.page.server.get_port(), token, log
+                served(settings), self.page.server.get_port(), log, self._count_refused
             )
         except BaseException:
             self.page.close()
             self._asking.close()
             self._stopping.close()
             raise
-        self._hands = Hands(self.page, bus, settings.lease_s, log, self._stop_robots)
+        self._hands = Hands(self.page, bus, settings.lease_s, log, self._stop_everybody)
         self._painter: Painter[Picture] = Painter(self._view.draw, settings.rate_hz, log)
 
     def start(self) -> None:
@@ -105,7 +106,7 @@ class Console(Service):
         bus, keys, seen = self.bus, self.bus.keys, self._seen
         Listening(bus, seen, self.log, self._on_mark)
         bus.subscribe(TrainingProgress, keys.training, self._on_training)
-        bus.watch(keys.presence(ANY, ANY), self._on_presence)
+        Presence(bus, seen, self.log, self._on_process)
         bus.every(TAKE_EVERY_S, self._take)
         bus.every(1 / HANDLE_HZ, self._hands.tell_handle)
         bus.every(1 / self.settings.rate_hz, self._show)
@@ -128,7 +129,8 @@ class Console(Service):
     def url(self) -> str:
         """Where the page is served; a token is not in it."""
         host = "127.0.0.1" if self.settings.host in ("0.0.0.0", "::") else self.settings.host
-        return f"http://{f'[{host}]' if ':' in host else host}:{self._gateway.port}"
+        scheme = "http" if self.settings.page_certificate is None else "https"
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self._gateway.port}"
 
     def health(self) -> tuple[bool, str]:
         """Healthy unless drawing fails."""
@@ -205,9 +207,11 @@ class Console(Service):
         self._asking.take()
         self._stopping.take()
 
-    def _stop_robots(self) -> None:
-        robots = [member for member in self._seen.members if member.service == "robot"]
-        self._stopping.stop(robots, self._tell)
+    def _stop_everybody(self) -> None:
+        members = self._seen.members
+        robots = [member for member in members if member.service == "robot"]
+        crowded = len(members) >= MOST_TOKENS
+        self._stopping.stop_everybody(robots, self._tell, crowded=crowded)
 
     def _show(self) -> None:
         now_s = time.monotonic()
@@ -223,16 +227,7 @@ class Console(Service):
             # A new recording begins with nothing marked.
             self._seen.marking = self._seen.marking._replace(now="")
         self._tell(f"asking {question.service} to {question.verb} …")
-        self._request(question, self._tell, self._tell)
-
-    def _request(
-        self, question: Question, done: Callable[[str], None], failed: Callable[[str], None]
-    ) -> None:
-        member = first_of(question.service, self._seen.members)
-        if member is None:
-            failed(f"no {question.service} is there to {question.verb}: start one")
-        else:
-            self._asking.request(member, question.verb, question.body, done, failed)
+        self._requesting.request(question, self._tell, self._tell)
 
     def _label(self, state: str) -> None:
         self._say(wishes.label(state, self._seen.clock, self._seen.step))
@@ -250,20 +245,15 @@ class Console(Service):
     def _tell(self, answer: str) -> None:
         self._seen.answer = answer
 
+    def _count_refused(self, reason: str) -> None:
+        self.bus.counters.count_refused(FLOOD, reason)
+
     # --- listening --------------------------------------------------------------------------------
 
     def _on_training(self, received: Received[TrainingProgress]) -> None:
         self._seen.training = received.body
 
-    def _on_presence(self, key: str, alive: bool) -> None:
-        member = self.bus.keys.member_of(key)
-        if member == (self.name, self.bus.source.instance):
-            return
-        if not alive:
-            self._seen.members.discard(member)
-            self._seen.health.pop(member, None)
-            return
-        self._seen.members.add(member)
+    def _on_process(self, member: Member) -> None:
         if member.service == "robot":
             looks = self.bus.keys.rpc(member.service, member.instance, "looks")
             self._asking.ask(looks, Ask(), RobotLooks, self._on_looks, timeout_s=5.0)
@@ -284,6 +274,18 @@ class Console(Service):
         }
         there = self._seen.members
         self._seen.health = {member: health for member, health in told.items() if member in there}
+
+
+def served(settings: ConsoleSettings) -> Served:
+    """Return where and how the page is served.
+
+    Raises UserError for a certificate or a key that cannot be used.
+    """
+    encrypted = None
+    if settings.page_certificate is not None and settings.page_key is not None:
+        encrypted = encryption(settings.page_certificate, settings.page_key)
+    token = settings.token.get_secret_value() if settings.token is not None else None
+    return Served(settings.host, settings.port, token, settings.page_names, encrypted)
 
 
 def _cued(task: Task) -> bool:

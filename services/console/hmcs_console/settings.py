@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 
 from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
-from hmcs_console.serving.admission import is_loopback
+from hmcs_console.serving.places import is_loopback, is_name
 
 
 class ConsoleSettings(ServiceSettings):
@@ -22,6 +22,14 @@ class ConsoleSettings(ServiceSettings):
         default=None, min_length=8, validate_default=True
     )
     """Who opens the page with `?token=…` is let in; without one everybody on this machine is."""
+    page_names: tuple[str, ...] = ()
+    """Names the page may be opened by, beside its addresses and localhost, e.g. `robot.example`;
+    under any other name it is refused."""
+    page_certificate: Annotated[Path | None, EMPTY_IS_NONE] = None
+    """PEM file of a certificate; with it the page is served encrypted (https, wss) and no other
+    way."""
+    page_key: Annotated[Path | None, EMPTY_IS_NONE] = Field(default=None, validate_default=True)
+    """PEM file of the key of `page_certificate`, without a password."""
     rate_hz: float = Field(default=30.0, ge=2, le=100)
     """How often the page is drawn at best."""
     lease_s: float = Field(default=0.25, ge=0.1, le=2.0)
@@ -40,10 +48,30 @@ class ConsoleSettings(ServiceSettings):
     def _is_given_where_others_can_reach_the_page(
         cls, token: SecretStr | None, info: ValidationInfo
     ) -> SecretStr | None:
-        host = info.data.get("host", "")
-        if token is None and host and not is_loopback(host):
+        host = info.data.get("host")
+        if token is None and host is not None and not is_loopback(host):
             raise ValueError(
-                f"host {host} can be reached from other machines, and whoever reaches the page "
+                f"host {host!r} can be reached from other machines, and whoever reaches the page "
                 "can move the robot: give a token, or a loopback host"
             )
         return token
+
+    @field_validator("page_names")
+    @classmethod
+    def _are_names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        wrong = [name for name in names if not is_name(name)]
+        if wrong:
+            raise ValueError(
+                f"{', '.join(map(repr, wrong))} is no name of a host: give names without scheme "
+                "and port, e.g. robot.example"
+            )
+        return names
+
+    @field_validator("page_key")
+    @classmethod
+    def _goes_with_a_certificate(cls, key: Path | None, info: ValidationInfo) -> Path | None:
+        if "page_certificate" in info.data and (key is None) != (
+            info.data["page_certificate"] is None
+        ):
+            raise ValueError("a certificate and its key go together: give both, or neither")
+        return key

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -39,7 +38,7 @@ class View:
         log: logging.Logger,
     ) -> None:
         start_m = _HANDLE_AT_M if task is None else task.robot.tool_start_m
-        self.page = Page(np.array(start_m), lease_s)
+        self.page = Page(np.array(start_m), lease_s, log)
         server = self.page.server
         states = () if task is None else tuple(state.name for state in task.states)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -81,6 +80,6 @@ class View:
         if picture.training is not self._training:
             self._training = told = picture.training
             if told is not None and told.stage == "done" and told.path:
-                self._models.look_in(Path(told.path))
+                self._models.look_in(told.path)
         belief = picture.belief
         return self._models.find(picture.active, "" if belief is None else belief.model_hash)

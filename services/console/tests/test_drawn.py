@@ -18,10 +18,18 @@ from hmcs.bus.messages import Motion, RobotLooks, RobotState
 from hmcs.bus.service import UserError
 from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.robot_model import joints_of, load_robot, written
-from hmcs_console.seeing.models import Models, guide_of, load_models, task_of
+from hmcs_console.seeing.models import (
+    MOST_MISSED,
+    MOST_TOLD,
+    READ_EVERY_S,
+    Models,
+    guide_of,
+    load_models,
+    task_of,
+)
 from hmcs_console.seeing.seen import FORGOTTEN_S, Seen
-from hmcs_console.serving.page import Server
 from hmcs_console.serving.painter import Painter
+from hmcs_console.serving.server import Server
 
 LOG = logging.getLogger("test")
 URDF = """<robot name="arm"><link name="base"/><link name="upper"><visual><geometry>
@@ -95,15 +103,44 @@ def test_a_model_is_looked_for_in_files_once_until_another_is_written(
     (model,) = load_models([model_file])
     places = (tmp_path / "damaged.hmcs", tmp_path / "nowhere")
     places[0].write_bytes(b"no model")
-    models = Models((), places, LOG)
+    now_s = [0.0]
+    models = Models((), places, LOG, lambda: now_s[0])
     with caplog.at_level(logging.INFO):
         assert models.find("lines", model.hash) is None
         assert models.find("lines", model.hash) is None
     assert len(caplog.records) == 1
-    models.look_in(model_file)
+    models.look_in(str(model_file))
+    now_s[0] = READ_EVERY_S
     found = models.find("lines", model.hash)
     assert found is not None
     assert found.hash == model.hash
+
+
+def test_whoever_tells_of_ever_new_models_has_no_file_read_more_often(
+    model_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Path] = []
+    now_s = [0.0]
+    monkeypatch.setattr("hmcs_console.seeing.models.load_model", read.append)
+    monkeypatch.setattr(Models, "_take", lambda *_: None)
+    models = Models((), (model_file,), LOG, lambda: now_s[0])
+    for number in range(1000):
+        models.look_in(f"/somewhere/{number}.hmcs")
+        assert models.find("lines", f"hash {number}") is None
+        now_s[0] += 0.01
+    assert read.count(model_file) == pytest.approx(10.0 / READ_EVERY_S, abs=1)
+    assert len(models._told) == MOST_TOLD
+    assert len(models._missed) <= MOST_MISSED
+
+
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "/m/a\x00.hmcs", "/m/a\n.hmcs", "", "/m/" + "x" * 5000 + ".hmcs", "/m"]
+)
+def test_a_path_that_is_told_and_is_none_of_a_model_file_is_not_looked_at(path: str) -> None:
+    models = Models((), (), LOG)
+    models.look_in(path)
+    assert not models._told
+    assert models.find("lines", "hash") is None
 
 
 def test_a_robot_is_loaded_with_the_meshes_that_came_with_it() -> None:
@@ -169,7 +206,7 @@ def poses(robot: DrawnRobot) -> list[tuple[list[float], list[float]]]:
 
 
 def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
-    server = Server()
+    server = Server(LOG)
     quick, exact = DrawnRobot(server, moving(), "/quick"), DrawnRobot(server, moving(), "/exact")
     for joints in (
         {"turn": 0.7, "slide": -0.3, "wheel": 2.5},
@@ -185,7 +222,7 @@ def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
 
 
 def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None:
-    server = Server()
+    server = Server(LOG)
     robot = DrawnRobot(server, moving(), "/robot")
     robot.move({"turn": 0.5, "wheel": 1.0})
     before = poses(robot)

@@ -30,7 +30,7 @@ from hmcs.task import load_task, shipped_tasks
 from hmcs_console.drawing.drawn_guides import DrawnGuides
 from hmcs_console.seeing.glancing import Told, told_in
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.page import Server
+from hmcs_console.serving.server import Server
 from hmcs_console.telling import spoken_rules
 
 MakeCell = Callable[..., Any]
@@ -79,7 +79,7 @@ def believed(**fields: Any) -> Belief:
 
 @pytest.fixture
 def server() -> Iterator[Server]:
-    server = Server()
+    server = Server(logging.getLogger("test"))
     yield server
     server.stop()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -47,6 +48,9 @@ class Others:
         self._training = bus.publisher(TrainingProgress, bus.keys.training)
         self._beliefs = {
             name: bus.publisher(Belief, bus.keys.belief(name)) for name in ("old", "mine")
+        }
+        self.tokens = {
+            name: bus.announce(bus.keys.member(name, "recognizer", "r")) for name in self._beliefs
         }
         publishers = [self._fixture, self._training, *self._beliefs.values()]
         cell.until(lambda: all(publisher.matching for publisher in publishers), "the console")
@@ -166,6 +170,60 @@ def test_a_refusal_leaves_active_what_was_active(
     assert "no such file" in others.told
     assert others.asked[-1] == refuses
     assert others.active == "old"
+
+
+def test_a_recognizer_that_no_process_runs_is_not_activated(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    others = Others(cell, make_process)
+    others.train()
+    others.tokens["mine"].withdraw()
+    cell.until(lambda: not cell.service._seen.runners.run("mine", set()), "the withdrawal")
+    cell.service.ask(wishes.activate("mine"))
+    others.go_on(lambda: "no process that is there runs it" in cell.service.answer, "the reason")
+    assert cell.service.answer.startswith("mine is not activated")
+    cell.service.ask(wishes.activate("made-up"))
+    others.go_on(lambda: "made-up is not activated" in cell.service.answer, "the reason")
+    assert others.asked == []
+    assert others.active == "old"
+
+
+def test_a_recognizer_is_activated_as_soon_as_a_process_runs_it(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    others = Others(cell, make_process)
+    others.train()
+    others.tokens["mine"].withdraw()
+    cell.until(lambda: not cell.service._seen.runners.run("mine", set()), "the withdrawal")
+    cell.service.ask(wishes.activate("mine"))
+    cell.wait(0.2)
+    assert others.asked == []
+    cell.other.announce(cell.other.keys.member("mine", "task_hmm", "t"))
+    others.go_on(lambda: others.active == "mine", "the newcomer")
+
+
+def test_a_recognizer_that_is_followed_and_run_by_nobody_is_told(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    others = Others(cell, make_process)
+    others.train()
+    seen = cell.service._seen
+
+    def unrun() -> str:
+        return str(seen.picture(time.monotonic(), "", None).unrun)
+
+    others.go_on(lambda: seen.active(time.monotonic()) == "old", "the one that is followed")
+    assert unrun() == ""
+    others.tokens["old"].withdraw()
+    others.go_on(lambda: unrun() == "old", "that nobody runs it")
+    cell.other.announce(cell.other.keys.member("old", "gesteme_classifier", "c"))
+    cell.wait(0.3)
+    assert unrun() == "old"
+    cell.other.announce(cell.other.keys.member("old", "task_hmm", "t"))
+    others.go_on(lambda: unrun() == "", "who runs it")
 
 
 def test_there_is_no_way_back_before_another_was_active(make_cell: MakeCell) -> None:

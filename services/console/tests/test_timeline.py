@@ -27,7 +27,7 @@ from hmcs_console.teaching.takes import (
     states_of,
     unlabeled,
 )
-from hmcs_console.teaching.timeline import NONE, TakePath, Timeline
+from hmcs_console.teaching.timeline import TakePath, Timeline
 
 STATES = ("free", "in")
 
@@ -262,10 +262,10 @@ def test_controls_are_there_only_while_a_recording_is_shown(server: Any) -> None
 
     assert draw(Take()) == (False, False)
     assert draw(take()) == (True, True)
-    assert timeline._choice.value == "two.mcap"
-    assert timeline._state.options == STATES
+    assert timeline._choice.chosen == "two.mcap"
+    assert timeline._state.offered == STATES
     assert draw(hidden(take())) == (False, False)
-    assert timeline._choice.value == NONE
+    assert timeline._choice.chosen == ""
 
 
 def test_the_slider_is_as_long_as_the_recording(server: Any) -> None:

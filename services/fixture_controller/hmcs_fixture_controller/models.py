@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from hmcs.bus.service import UserError
 from hmcs.fixtures.exchanged import Guides
+from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
 
@@ -57,7 +58,7 @@ class Recognizers(dict[str, Loaded]):
         return [oldest]
 
 
-def load_models(places: Iterable[Path]) -> dict[str, Model]:
+def load_models(places: Iterable[Path], model_key: Path | None = None) -> dict[str, Model]:
     """Return the models in files, and in folders of `*.hmcs` files, by name.
 
     Raises ModelFileError for a file that cannot be used, UserError for a folder without files and
@@ -66,7 +67,7 @@ def load_models(places: Iterable[Path]) -> dict[str, Model]:
     models: dict[str, Model] = {}
     for place in places:
         for file in model_files(place):
-            model = load_model(file)
+            model = load_model(file, verify=signed_by(model_key))
             if models.setdefault(model.name, model).hash != model.hash:
                 raise UserError(
                     f"{file}: a second, different model named {model.name!r}: leave one of them "

@@ -38,6 +38,7 @@ from hmcs.bus.verbs import ACTIVATE, LAST_STEPS, LOAD_MODEL
 from hmcs.controller_feed import ControllerFeed
 from hmcs.fixtures.controller import Controller
 from hmcs.fixtures.exchanged import Fixture, Guides
+from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import guides_of
@@ -75,7 +76,7 @@ class FixtureController(Service):
         self._paired: Pairing | None = None
         self._pairings: Publisher[Pairing] | None = None
         self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
-        for model in load_models(settings.models).values():
+        for model in load_models(settings.models, settings.model_key).values():
             self._adopt(model, guides_of(model))
         if settings.active_model is not None:
             self._follow(settings.active_model)
@@ -279,7 +280,7 @@ class FixtureController(Service):
         The file is read and its guides are made on the calling thread; the loop only takes them
         over. Raises ModelFileError or RegionError where it cannot be used; nothing changes then.
         """
-        model = load_model(path)
+        model = load_model(path, verify=signed_by(self.settings.model_key))
         guides = guides_of(model)
         return self.bus.in_loop(lambda: self._take_over(model, guides))
 

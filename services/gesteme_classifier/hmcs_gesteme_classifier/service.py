@@ -6,10 +6,13 @@ import logging
 import time
 from collections import deque
 
+from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import Evidence
+from hmcs.bus.presence import TOKEN, member_named, present
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
+from hmcs.model_signing import signed_by
 from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import evidence_message, step_of
@@ -30,13 +33,16 @@ class GestemeClassifier(Service):
 
     def __init__(self, settings: GestemeClassifierSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model)
+        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
         self._named = _named(settings.gestemes, self._model.gesteme_names, settings.model)
         self._evidence = bus.publisher(
             Evidence, bus.keys.evidence(self._model.name, bus.source.instance)
         )
         self._peers_key = bus.keys.member(self._model.name, self.name)
         self._peers = {bus.source.instance}
+        self._living = {bus.source.instance}
+        """Peers whose tokens the watch has told of, and not yet that they went."""
+        self._seldom = Seldom(log)
         # One more than is scored: how the hand turns in a step is told by the step before it.
         memory_steps = layers_of(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
@@ -56,14 +62,15 @@ class GestemeClassifier(Service):
             self._hold(self._named)
             self._feed.begin()
         else:
-            for key in self.bus.alive(self._peers_key):
-                self._peers.add(self.bus.keys.member_of(key).instance)
+            there = present(self.bus.keys, self.bus.alive(self._peers_key))
+            self._peers.update(peer.instance for peer in there.members)
             self._hold(self._share())
             self._feed.begin()
             self.bus.announce(
                 self.bus.keys.member(self._model.name, self.name, self.bus.source.instance)
             )
             self.bus.watch(self._peers_key, self._on_peer)
+            self.bus.at(time.monotonic_ns() + HANDOVER_NS, self._keep_living_peers)
         self._ready = True
 
     def health(self) -> tuple[bool, str]:
@@ -92,12 +99,22 @@ class GestemeClassifier(Service):
         self._bank = bank_of(self._model, self._bank.held)
         self.log.info("beginning anew", extra={"step": index})
 
-    def _on_peer(self, key: str, alive: bool) -> None:
-        peer = self.bus.keys.member_of(key).instance
-        if peer != self.bus.source.instance:
-            (self._peers.add if alive else self._peers.discard)(peer)
-            self._hold(self._share() | frozenset(self._bank.held))
+    def _on_peer(self, token: str, alive: bool) -> None:
+        peer = member_named(self.bus.keys, token)
+        if peer is None:
+            self.bus.counters.count_refused(TOKEN)
+            self._seldom.warning("token", "a peer of an impossible name is no peer", token=token)
+        elif peer.instance != self.bus.source.instance:
+            for known in (self._peers, self._living):
+                (known.add if alive else known.discard)(peer.instance)
+            # First of all, so that nothing that goes wrong below keeps it from being done.
             self.bus.at(time.monotonic_ns() + HANDOVER_NS, self._let_go)
+            self._hold(self._share() | frozenset(self._bank.held))
+
+    def _keep_living_peers(self) -> None:
+        """Forget peers that went after they were looked for and before they were watched."""
+        self._peers &= self._living
+        self._hold(self._share())
 
     def _let_go(self) -> None:
         self._hold(self._share())

@@ -8,6 +8,7 @@ from hmcs.bus.messages import Belief, Evidence
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import Recognizer
 from hmcs.recognition.recognizers import kind_named, recognizer_of
 from hmcs.translation import belief_message, evidence_message, step_of
 
@@ -29,23 +30,22 @@ class Hosted:
         self._evidence = bus.publisher(Evidence, bus.keys.evidence(model.name, bus.source.instance))
         self._feed = StepFeed(bus, log, self._on_step, self._on_restart, memory_steps=memory_steps)
 
-    @property
-    def at_work(self) -> bool:
-        """Whether it has caught up with the motion, and publishes."""
-        return self._ready
+    def catch_up(self) -> None:
+        """Catch up with the motion so far; on any thread, before it begins."""
+        self._feed.catch_up()
 
     def begin(self) -> None:
-        """Catch up with the motion so far; beliefs begin with the next step."""
-        self._feed.begin()
+        """Publish a belief for every step from now on."""
+        self._feed.listen()
         self._ready = True
         self._bus.announce(
             self._bus.keys.member(self.model.name, self._service, self._bus.source.instance)
         )
 
-    def renew(self, model: Model) -> None:
-        """Work with another model of the same name from the next step on, as one that is new."""
+    def renew(self, model: Model, recognizer: Recognizer) -> None:
+        """Work with another model of the same name, and its fresh recognizer, from now on."""
         self.model, self.kind = model, kind_named(model.recognizer)
-        self._recognizer = recognizer_of(model, anywhere=True)
+        self._recognizer = recognizer
 
     def _on_restart(self, index: int) -> None:
         # A motion that is joined in its middle may be in any state of the task.
@@ -53,7 +53,12 @@ class Hosted:
         self._log.info("beginning anew", extra={"model": self.model.name, "step": index})
 
     def _on_step(self, fed: FedStep) -> None:
-        recognition = self._recognizer.step(step_of(fed.step))
+        try:
+            recognition = self._recognizer.step(step_of(fed.step))
+        except Exception:
+            # A recognizer that failed at one step cannot go on; a fresh one may be in any state.
+            self._recognizer = recognizer_of(self.model, anywhere=True)
+            raise
         if self._ready:
             self.believed += 1
             if recognition.evidence is not None:

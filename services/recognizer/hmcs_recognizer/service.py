@@ -7,14 +7,22 @@ filter, too, runs here whole; as classifiers and a task HMM it is spread over pr
 from __future__ import annotations
 
 import logging
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from hmcs.bus.messages import Done, LoadModel
 from hmcs.bus.service import Service
-from hmcs.bus.session import Bus
+from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.verbs import LOAD_MODEL
+from hmcs.model_signing import signed_by
+from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
+from hmcs.recognition.recognizers import recognizer_of
 from hmcs_recognizer.hosted import Hosted
 from hmcs_recognizer.settings import RecognizerSettings
+
+MOST_MODELS = 32
+"""Models in one process: each costs its share of every step."""
 
 
 class RecognizerService(Service):
@@ -27,14 +35,17 @@ class RecognizerService(Service):
     def __init__(self, settings: RecognizerSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._hosted: dict[str, Hosted] = {}
+        self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
         if settings.model is not None:
-            self._take(settings.model)
+            model = load_model(settings.model, verify=signed_by(settings.model_key))
+            self._hosted[model.name] = self._host(model)
 
     def start(self) -> None:
         """Catch up with the motion so far, and wait to be given more models."""
         for hosted in self._hosted.values():
+            hosted.catch_up()
             hosted.begin()
-        self.bus.answer("load_model", LoadModel, self._load)
+        LOAD_MODEL.answer(self.bus, self._load, aside=self._files)
 
     def health(self) -> tuple[bool, str]:
         """Healthy always: a recognizer that waits for steps, or a model, does what it is for."""
@@ -56,20 +67,35 @@ class RecognizerService(Service):
             "source": "; ".join(hosted.kind.source for hosted in every),
         }
 
-    def _load(self, asked: LoadModel) -> Done:
-        hosted = self._take(Path(asked.path))
-        if not hosted.at_work:
-            hosted.begin()
-        self.log.info("model loaded", extra={"model": hosted.model.name})
-        return Done(detail=f"{hosted.model.name} {hosted.model.hash} is at work")
+    def close(self) -> None:
+        """Read no more files."""
+        self._files.shutdown(wait=False, cancel_futures=True)
 
-    def _take(self, path: Path) -> Hosted:
-        """Work with a model file; raises ModelFileError where it cannot be used."""
-        model = load_model(path)
-        known = self._hosted.get(model.name)
+    def _load(self, asked: LoadModel) -> Done:
+        """Work with a model file too; on a thread beside the loop, which serves the others.
+
+        Raises ModelFileError where it cannot be used, RequestRefusedError for one too many.
+        """
+        model = load_model(Path(asked.path), verify=signed_by(self.settings.model_key))
+        known = self.bus.in_loop(lambda: self._hosted.get(model.name))
         if known is not None:
-            known.renew(model)
-            return known
-        hosted = Hosted(model, self.bus, self.log, self.name, self.settings.memory_steps)
-        self._hosted[model.name] = hosted
-        return hosted
+            fresh = recognizer_of(model, anywhere=True)
+            self.bus.in_loop(lambda: known.renew(model, fresh))
+        else:
+            if len(self._hosted) >= MOST_MODELS:
+                raise RequestRefusedError(
+                    f"{MOST_MODELS} models are at work here already: start another recognizer "
+                    "process for more"
+                )
+            hosted = self._host(model)
+            hosted.catch_up()
+            self.bus.in_loop(lambda: self._begin(hosted))
+        self.log.info("model loaded", extra={"model": model.name})
+        return Done(detail=f"{model.name} {model.hash} is at work")
+
+    def _host(self, model: Model) -> Hosted:
+        return Hosted(model, self.bus, self.log, self.name, self.settings.memory_steps)
+
+    def _begin(self, hosted: Hosted) -> None:
+        self._hosted[hosted.model.name] = hosted
+        hosted.begin()

@@ -124,7 +124,7 @@ def test_it_takes_another_model_while_it_runs(bench: Bench, taught: Taught, tmp_
     with ThreadPoolExecutor(1) as aside:
         loading = aside.submit(bench.service._load, LoadModel(path=str(another)))
         while not loading.done():
-            scene.bus.pump(0.01)
+            scene.stack.pump()
     assert loading.result().detail.startswith("another ")
     for step in steps[10:]:
         scene.hand.step(step)
@@ -148,13 +148,13 @@ def test_of_a_layered_model_it_tells_the_evidence_its_beliefs_stand_on(
     with ThreadPoolExecutor(1) as aside:
         loading = aside.submit(bench.service._load, LoadModel(path=str(file)))
         while not loading.done():
-            scene.bus.pump(0.01)
+            scene.stack.pump()
     steps = steps_performed(6)[:30]
     for step in steps:
         scene.hand.step(step)
     bench.until_believed(2 * len(steps))
     scene.stack.until(lambda: len(scene.watcher.evidence) >= len(steps))
-    assert {received.key.split("/")[-3] for received in scene.watcher.evidence} == {"layered"}
+    assert {recognizer_in(r.key).model for r in scene.watcher.evidence} == {"layered"}
     recognizer = recognizer_of(model)
     for received, step in zip(scene.watcher.evidence, steps, strict=True):
         expected = recognizer.step(step).evidence

@@ -1,14 +1,13 @@
 """The service: everything that is published in the cell, into a file, and never in anybody's way.
 
-Where the disk is full the recording ends, which is told in health and log; what comes from then on
-is counted as lost, and recording goes on in a new file as soon as there is room. Recordings are
-read, to set labels by, on a thread of its own meanwhile.
+Where the disk is full, or the folder gone, the recording ends, which is told in health and log;
+what comes from then on is counted as lost, and recording goes on in a new file as soon as it can.
+Recordings are read, to set labels by, on a thread of its own meanwhile.
 """
 
 from __future__ import annotations
 
 import importlib.metadata
-import json
 import logging
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -20,8 +19,6 @@ from hmcs.bus.keys import ANY, check_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import (
-    Ask,
-    Description,
     Done,
     Envelope,
     LastSteps,
@@ -30,15 +27,20 @@ from hmcs.bus.messages import (
     OutlineQuestion,
     Record,
     SetLabels,
-    SettingsReport,
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.wire import encode
-from hmcs.recordings.parts import Limits, Preface, Recording, as_fields
+from hmcs.errors import UserError
+from hmcs.recordings.label_files import has_fingerprint
+from hmcs.recordings.labels import labels_beside
+from hmcs.recordings.parts import Limits, Preface, Recording
 from hmcs.recordings.plain import Fields, fields_of
 from hmcs_recorder.labeling import labels_set, outline_of
+from hmcs_recorder.prefacing import ask_all, joined, preface_of
+from hmcs_recorder.robots import Robots
 from hmcs_recorder.settings import RecorderSettings
+from hmcs_recorder.wall_clock import WallClock
 
 LOST = "recording"
 """What is counted as lost while nothing can be written."""
@@ -47,7 +49,6 @@ RETRY_S = 5.0
 """After so long without room it is tried again."""
 LARGEST_CLOCK_DIFFERENCE_NS = 5_000_000_000
 """A capture that seems longer ago was told by another machine's clock."""
-ASK_S = 0.5
 
 
 class Recorder(Service):
@@ -65,7 +66,10 @@ class Recorder(Service):
         self._trouble = ""
         self._again_s = 0.0
         self._sequences = Sequences()
-        self._wall_minus_monotonic_ns = time.time_ns() - time.monotonic_ns()
+        self._clock = WallClock(lambda: time.time_ns(), lambda: time.monotonic_ns())
+        self._earliest_ns = 0
+        """No message of this file is logged before: times within a file never fall."""
+        self._robots = Robots(bus, log)
         self._reading = ThreadPoolExecutor(1, thread_name_prefix="reading")
 
     def start(self) -> None:
@@ -122,8 +126,10 @@ class Recorder(Service):
             check_name("recording", asked.name)
         begun = self._begin(asked.name)
         if begun is None:
-            raise RequestRefusedError(self._trouble)
-        return Done(detail=f"recording to {begun.path}")
+            # Who was refused does not expect it to begin later by itself.
+            self._wanted, reason, self._trouble = "", self._trouble, ""
+            raise RequestRefusedError(reason)
+        return Done(detail=f"recording to {begun.path}{_of_labels_there(begun.path)}")
 
     # --- writing ----------------------------------------------------------------------------------
 
@@ -133,20 +139,51 @@ class Recorder(Service):
         if self._recording is None:
             self.bus.counters.lost[LOST] += 1
             return
-        log_ns = arrival.received_ns + self._wall_minus_monotonic_ns
         try:
             fields = fields_of(arrival.payload)
-            captured_ns = self._captured_ns(fields, log_ns)
-            self._recording.write(arrival.key, fields, log_ns, captured_ns)
-        except ValueError as error:
-            self.bus.counters.count_refused(LOST, str(error))
-            self._seldom.warning(arrival.key, "not recorded", key=arrival.key, reason=str(error))
-            return
+            self._mind_clock(self._recording)
+            self._write(self._recording, arrival, fields)
         except OSError as error:
             self.bus.counters.lost[LOST] += 1
             self._interrupted(error)
             return
+        except Exception as error:
+            # Whatever it is about one message, those that came with it are recorded.
+            expected = isinstance(error, ValueError)
+            self.bus.counters.count_refused(LOST, str(error))
+            self._seldom.warning(
+                "not recorded",
+                "not recorded",
+                exc_info=not expected,
+                key=arrival.key,
+                reason=str(error) or type(error).__name__,
+            )
+            return
         self._count(arrival.key, fields)
+
+    def _write(self, recording: Recording, arrival: Arrival, fields: Fields) -> None:
+        log_ns = max(self._clock.of(arrival.received_ns), self._earliest_ns)
+        before = recording.path
+        recording.write(arrival.key, fields, log_ns, self._captured_ns(fields, log_ns))
+        self._earliest_ns = log_ns
+        if recording.path != before:
+            self.log.info("recording goes on", extra={"file": str(recording.path)})
+
+    def _mind_clock(self, recording: Recording) -> None:
+        """Go on in a new file where the clock was set, or the machine slept.
+
+        Within a file times never fall, and each file's times are those that people know.
+        """
+        by_ns = self._clock.set_by_ns()
+        if not by_ns:
+            return
+        self._clock.reckon_anew()
+        self._earliest_ns = self._clock.now_ns()
+        recording.next_part(self._earliest_ns)
+        self.log.warning(
+            "the system's clock was set, or the machine slept: recording goes on in a new file",
+            extra={"by_s": by_ns / 1e9, "file": str(recording.path)},
+        )
 
     def _count(self, key: str, fields: Fields) -> None:
         lost = self._sequences.note(key, fields["source"]["boot"], fields["seq"])
@@ -158,20 +195,22 @@ class Recorder(Service):
 
     def _captured_ns(self, fields: Fields, log_ns: int) -> int | None:
         origin = fields.get("origin")
-        if not isinstance(origin, dict) or not isinstance(origin.get("captured_ns"), int):
+        if origin is None:
             return None
-        captured_ns = origin["captured_ns"] + self._wall_minus_monotonic_ns
+        captured_ns = self._clock.of(origin["captured_ns"])
         known = 0 <= log_ns - captured_ns <= LARGEST_CLOCK_DIFFERENCE_NS
         return captured_ns if known else None
 
     def _on_flush(self) -> None:
         if self._recording is not None:
             try:
+                self._mind_clock(self._recording)
+                self._robots.name_joints(self._recording, self._earliest_ns)
                 self._recording.flush()
             except OSError as error:
                 self._interrupted(error)
         elif self._wanted and time.monotonic() >= self._again_s:
-            self._open(f"{self._wanted}-{_now():%H%M%S%f}")
+            self._open(f"{self._wanted}-{_now():%H%M%S%f}", next_free=True)
 
     def _interrupted(self, error: OSError) -> None:
         if self._recording is not None:
@@ -183,38 +222,52 @@ class Recorder(Service):
         self._again_s = time.monotonic() + RETRY_S
 
     def _begin(self, name: str) -> Recording | None:
+        """Begin a recording, named by date and time where it has no name; else as `_open`."""
         self._wanted = name or f"{_now():%Y%m%d-%H%M%S}"
-        return self._open(self._wanted)
+        try:
+            return self._open(self._wanted, next_free=not name)
+        except UserError:
+            self._wanted = ""
+            raise
 
-    def _open(self, name: str) -> Recording | None:
+    def _open(self, name: str, *, next_free: bool) -> Recording | None:
+        """Begin a file; None where that cannot be, which is told in health.
+
+        Raises UserError where the name is taken, unless the next one that is free will do.
+        """
         settings = self.settings
         limits = Limits(settings.part_mb, settings.part_s, settings.limit_mb, settings.free_mb)
         library = f"hmcs {importlib.metadata.version('hmcs')}"
+        self._clock.reckon_anew()
+        begun_ns = self._earliest_ns = self._clock.now_ns()
         try:
-            self._recording = Recording(
-                settings.folder, name, limits, self._preface, time.time_ns(), library
+            recording = Recording(
+                settings.folder, name, limits, self._preface, begun_ns, library, next_free=next_free
             )
         except OSError as error:
             self._interrupted(error)
             return None
-        self._trouble = ""
-        self.log.info("recording", extra={"file": str(self._recording.path)})
-        self._write_past_steps(self._recording)
-        return self._recording
+        self._recording, self._trouble = recording, ""
+        try:
+            self._write_past_steps(recording, begun_ns)
+        except OSError as error:
+            self._interrupted(error)
+            return None
+        self.log.info("recording", extra={"file": str(recording.path)})
+        return recording
 
-    def _write_past_steps(self, recording: Recording) -> None:
+    def _write_past_steps(self, recording: Recording, begun_ns: int) -> None:
         """Begin with the steps made before: recognizers know them, and so must a replay."""
         bus = self.bus
         key = bus.keys.rpc("input_device", ANY, "last_steps")
         question = LastStepsQuestion(count=MOST_PAST_STEPS)
-        for answer in bus.ask(key, question, LastSteps, ASK_S)[:1]:
-            now_ns = time.monotonic_ns() + self._wall_minus_monotonic_ns
+        for answer in ask_all(bus, key, question, LastSteps)[:1]:
             for step, origin in zip(answer.body.steps, answer.body.origins, strict=False):
                 # A device numbers its steps as it numbers their messages.
                 envelope = Envelope(source=answer.envelope.source, seq=step.index, origin=origin)
                 fields = fields_of(encode(step, envelope))
-                captured_ns = self._captured_ns(fields, now_ns)
-                recording.write(bus.keys.step, fields, now_ns, captured_ns)
+                captured_ns = self._captured_ns(fields, begun_ns)
+                recording.write(bus.keys.step, fields, begun_ns, captured_ns)
 
     def _end(self) -> None:
         recording, self._recording, self._wanted, self._trouble = self._recording, None, "", ""
@@ -231,39 +284,21 @@ class Recorder(Service):
     # --- what is kept with it ---------------------------------------------------------------------
 
     def _preface(self) -> Preface:
-        """Who is there, what they are told to do, and the models they work with."""
-        bus = self.bus
-        described = bus.ask(bus.keys.rpc(ANY, ANY, "describe"), Ask(), Description, ASK_S)
-        settings = bus.ask(bus.keys.rpc(ANY, ANY, "settings"), Ask(), SettingsReport, ASK_S)
-        members = {
-            f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
-            for answer in described
-        }
-        told = {
-            f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
-            for answer in settings
-        }
-        metadata = {
-            "hmcs": as_fields(
-                {
-                    "version": importlib.metadata.version("hmcs"),
-                    "cell": bus.settings.cell,
-                    "begun": _now().isoformat(),
-                }
-            )
-        }
-        for member, description in members.items():
-            facts = {"version": description.version, **description.facts}
-            if member in told:
-                facts["settings"] = json.dumps(told[member].settings)
-            metadata[member] = as_fields(facts)
-        return Preface(metadata, {file.name: file.read_bytes() for file in self._models()})
+        self._robots.ask()
+        return joined(preface_of(self.bus, self.settings.models, self.log), *self._robots.kept())
 
-    def _models(self) -> list[Path]:
-        found: list[Path] = []
-        for place in self.settings.models:
-            found += sorted(place.glob("*.hmcs")) if place.is_dir() else [place]
-        return [file for file in found if file.is_file()]
+
+def _of_labels_there(recording: Path) -> str:
+    """What to tell of labels beside a recording that only begins."""
+    beside = labels_beside(recording)
+    if not beside.exists():
+        return ""
+    if has_fingerprint(beside):
+        return f"; the labels in {beside.name} are of an earlier one and do not count for it"
+    return (
+        f"; the labels in {beside.name} do not say of which recording they are and will count for "
+        "it: move that file away if they are of an earlier one"
+    )
 
 
 def _now() -> datetime:

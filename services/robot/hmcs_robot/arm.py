@@ -7,7 +7,6 @@ no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pybullet
@@ -53,19 +52,18 @@ class Arm:
         self._movable = len(movable)
         self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
         self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
-        self.apart = self._far_links(infos, turning, model)
+        joints_below = {BASE_LINK: 0}
+        for info in infos:
+            joints_below[info[0]] = joints_below[info[16]] + (info in turning)
+        self.moving_links = frozenset(link for link, below in joints_below.items() if below)
+        self.apart = self._far_links(joints_below, model)
         inertial = self._inertial[self._tool_link]
         in_link = np.array([0.0, 0.0, model.tool_offset_m]) - inertial.position
         self._tool_from_mass: Array = _matrix(inertial).T @ in_link
 
-    def _far_links(
-        self, infos: list[Any], turning: list[Any], model: RobotModel
-    ) -> list[tuple[int, int]]:
+    def _far_links(self, joints_below: dict[int, int], model: RobotModel) -> list[tuple[int, int]]:
         """Pairs of links with so many joints between them that they may meet but do not at home."""
         self.place(np.array(model.home))
-        joints_below = {BASE_LINK: 0}
-        for info in infos:
-            joints_below[info[0]] = joints_below[info[16]] + (info in turning)
         links = sorted(joints_below)
         return [
             (one, other)

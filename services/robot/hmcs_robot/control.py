@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.regions import NOTHING, Candidates
 from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Array, Pose
 from hmcs_robot.limits import (
@@ -23,6 +24,7 @@ from hmcs_robot.limits import (
     shortened,
     speed_scale,
     within_acceleration,
+    within_planes,
     within_speed,
     within_walls,
 )
@@ -37,6 +39,9 @@ class Tuning:
     slowest_share: float = 0.25
     """On its way into a singularity (smallest singular value below 2λ) the tool slows down in
     proportion, never below this share of its speed."""
+    surely_into: float = 0.3
+    """Cosine between a motion and the steepest way into a singularity from which on it slows down
+    fully; below it slows down less, so that nothing switches on and off."""
     correction_per_s: float = 10.0
     """Rate at which the tool is drawn to its reference pose, and a standing arm to its place."""
     largest_lag_m: float = 0.005
@@ -55,8 +60,6 @@ class Following(NamedTuple):
     """Where the tool should be by now."""
     twist: Array
     """The limited velocity it follows, shape (6,)."""
-    smallest: float = 0.0
-    """Singular value of the Jacobian at the tick before."""
 
 
 class Standing(NamedTuple):
@@ -74,8 +77,8 @@ class Motion(NamedTuple):
     carried: Following | Standing
     """To be passed to the next tick."""
     limited: tuple[str, ...]
-    """The limits that shape the motion: `speed`, `acceleration`, `workspace`, `singularity`,
-    `joint_speed`, `joint_1` …, `contact`."""
+    """The limits that shape the motion: `speed`, `acceleration`, `workspace`, `region`,
+    `singularity`, `joint_speed`, `joint_1` …, `contact`."""
 
     @property
     def reference_twist(self) -> Array:
@@ -106,40 +109,46 @@ def follow(
     limits: Limits,
     tuning: Tuning,
     period_s: float,
+    planes: Candidates = NOTHING,
 ) -> Motion:
     """Return the motion that follows `twist`, m/s and rad/s, shape (6,), within all limits.
 
     The speed limits keep the direction of the linear and of the angular part; a wall of the
-    workspace takes away the part that leads out; joint ranges, joint speeds and contacts slow the
-    motion as a whole, so that they never turn the tool from the commanded direction. What draws
-    the tool to its reference and a redundant arm to its `posture` (n,) gets what is left: it never
-    holds the commanded motion up.
+    workspace takes away the part that leads out, and a plane before a forbidden region the part
+    that leads in. Joint ranges, joint speeds and contacts slow the motion as a whole, so that they
+    never turn the tool from the commanded direction. After all of these the reference changes
+    within the acceleration limits; only ranges, walls, planes and contacts may brake harder. What
+    draws the tool to its reference and a redundant arm to its `posture` (n,) gets what is left: it
+    never holds the commanded motion up.
     """
     if not isinstance(carried, Following):
         carried = Following(arm.tool, np.zeros(6))
     fast_enough = within_speed(twist, limits)
-    reachable = within_acceleration(fast_enough, carried.twist, limits, period_s)
-    wanted = within_walls(reachable, arm.tool.position, limits)
+    walled = within_walls(fast_enough, arm.tool.position, limits)
+    admitted = within_planes(walled, planes, limits)
     inverse = _Inverse(arm.jacobian, tuning.damping)
-    walled = _differ(wanted, reachable)
     clear = inverse.smallest / (2 * tuning.damping)
-    if inverse.smallest < carried.smallest:
-        wanted = wanted * min(1.0, max(clear, tuning.slowest_share))
+    into = min(1.0, max(0.0, inverse.into_singularity(admitted) / tuning.surely_into))
+    slowed = admitted * (1.0 - into * (1.0 - min(1.0, max(clear, tuning.slowest_share))))
+
+    bounds = bounds_of(arm, limits, planes)
+    no_motion = np.zeros_like(arm.joint_positions)
+    scale, bound = bounds.scale(no_motion, inverse.velocities(slowed))
+    wanted = within_acceleration(scale * slowed, carried.twist, limits, period_s)
+    led = inverse.velocities(wanted)
+    hard_scale, hard_bound = bounds.hard.scale(no_motion, led)
 
     lag = _lag(arm.tool, carried.pose, tuning)
     drawn = within_speed(wanted + tuning.correction_per_s * lag, limits)
-    drawn = within_walls(drawn, arm.tool.position, limits)
-    bounds = bounds_of(arm, limits)
-    led = inverse.velocities(wanted)
-    scale, bound = bounds.scale(np.zeros_like(led), led)
+    drawn = within_planes(within_walls(drawn, arm.tool.position, limits), planes, limits)
     aside = inverse.velocities(drawn - wanted) + inverse.within_null_space(
         tuning.posture_per_s * (posture - arm.joint_positions)
     )
-    aside_scale, _ = bounds.scale(scale * led, aside)
-    velocities = scale * led + aside_scale * aside
+    aside_scale, _ = bounds.scale(hard_scale * led, aside)
+    velocities = hard_scale * led + aside_scale * aside
     slowing = speed_scale(arm.jacobian @ velocities, limits)
 
-    followed = slowing * scale * wanted
+    followed = slowing * hard_scale * wanted
     pose = Pose(
         arm.tool.position + lag[:3] + followed[:3] * period_s,
         quaternions.turned(
@@ -148,14 +157,16 @@ def follow(
     )
     limited = (
         *(("speed",) if _differ(fast_enough, twist) else ()),
-        *(("acceleration",) if _differ(reachable, fast_enough) else ()),
-        *(("workspace",) if walled else ()),
+        *(("workspace",) if _differ(walled, fast_enough) else ()),
+        *(("region",) if _differ(admitted, walled) else ()),
         *(("singularity",) if clear < 1.0 else ()),
         *bound,
+        *(("acceleration",) if _differ(wanted, scale * slowed) else ()),
+        *hard_bound,
     )
     return Motion(
         slowing * velocities,
-        Following(pose, followed, inverse.smallest),
+        Following(pose, followed),
         tuple(dict.fromkeys(limited)),
     )
 
@@ -178,8 +189,43 @@ class _Inverse:
     def __init__(self, jacobian: Array, damping: float) -> None:
         left, singular, right = np.linalg.svd(jacobian)
         self.smallest = float(singular[-1])
+        self._jacobian, self._damping = jacobian, damping
+        self._into, self._joints = left[:, -1], right[5]
+        """Of the smallest singular value: what the tool cannot do, and what the joints would."""
         self._inverse = right[:6].T @ ((singular / (singular**2 + damping**2))[:, None] * left.T)
         self._null_space = right[6:]
+
+    def into_singularity(self, twist: Array) -> float:
+        """Return the cosine between the joints' motion for `twist` and the steepest way into the
+        nearest singularity; negative where it leads out.
+
+        The joints are taken as if they were damped no more than at their fastest, 1/2λ: what
+        damping holds back goes into the singularity all the same.
+        """
+        held_back = 1.0 / (2.0 * self._damping) - self.smallest / (
+            self.smallest**2 + self._damping**2
+        )
+        joints = self.velocities(twist) + self._joints * float(self._into @ twist) * held_back
+        steepest = -self._growth()
+        size = float(np.linalg.norm(joints) * np.linalg.norm(steepest))
+        return float(joints @ steepest) / size if size > 0 else 0.0
+
+    def _growth(self) -> Array:
+        """Return how the smallest singular value grows with each joint, (n,): uᵀ ∂J/∂q v.
+
+        ∂Jᵢ/∂qⱼ is ωⱼ × (vᵢ, ωᵢ) for a joint j before i, and (ωᵢ × vⱼ, 0) for one after it.
+        """
+        linear, angular = self._jacobian[:3].T, self._jacobian[3:].T
+        along, turning = self._into[:3], self._into[3:]
+        growth = np.zeros(len(linear))
+        for i, share in enumerate(self._joints):
+            before, after = slice(0, i + 1), slice(i + 1, None)
+            growth[before] += share * (
+                np.cross(angular[before], linear[i]) @ along
+                + np.cross(angular[before], angular[i]) @ turning
+            )
+            growth[after] += share * (np.cross(angular[i], linear[after]) @ along)
+        return growth
 
     def velocities(self, twist: Array) -> Array:
         """Return the joint velocities (n,) for `twist`."""

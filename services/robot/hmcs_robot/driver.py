@@ -50,6 +50,17 @@ class Touch(NamedTuple):
     times the joint velocities it is the speed of parting, negative where the arm presses in."""
 
 
+class LinkNear(NamedTuple):
+    """A place where a link of the arm is near a forbidden region."""
+
+    name: str
+    """Of the region."""
+    distance_m: float
+    """Negative where the link is inside."""
+    separation_per_joint: Array
+    """As in `Touch`."""
+
+
 class ArmState(NamedTuple):
     """Where an arm is and what is near it, at one instant."""
 
@@ -65,6 +76,9 @@ class ArmState(NamedTuple):
     """None where no obstacle is within reach of the search."""
     touches: tuple[Touch, ...]
     """Empty while the arm is free."""
+    links_near: tuple[LinkNear, ...] = ()
+    """Where links are near a forbidden region of the task; empty where none is, or where the driver
+    cannot tell: then the tool alone is kept out."""
 
     @property
     def tool_twist(self) -> Array:
@@ -83,6 +97,8 @@ class ArmDriver(Protocol):
 
     name: str
     limits: JointLimits
+    joint_names: tuple[str, ...]
+    """As in the URDF, n of them."""
 
     def read(self) -> ArmState:
         """Return where the arm is now."""

@@ -11,10 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.keep_out import KeepOut
+from hmcs.fixtures.regions import NOTHING, Candidates
 from hmcs_robot.driver import ArmState, Array, JointLimits
 
 _NOTHING = 1e-6
 """A bound approached more slowly than this (rad/s, m/s) is not approached."""
+JOINT_SPEED = "joint_speed"
 _PRESSING_M_S = 1e-4
 """A contact that closes more slowly than this counts as sliding."""
 
@@ -36,6 +39,8 @@ class Limits:
     """Speed allowed per distance left to a wall of the workspace or the end of a joint's range."""
     wall_margin_m: float = 0.002
     joint_margin_rad: float = 0.01
+    link_margin_m: float = 0.001
+    """Links of the arm are kept so far off forbidden regions."""
 
 
 def within_speed(twist: Array, limits: Limits) -> Array:
@@ -67,6 +72,14 @@ def within_walls(twist: Array, position: Array, limits: Limits) -> Array:
     return np.concatenate([np.clip(twist[:3], -lower, upper), twist[3:]])
 
 
+def within_planes(twist: Array, planes: Candidates, limits: Limits) -> Array:
+    """Return the twist nearest to `twist` (6,) that brings no corner of the tool behind a plane.
+
+    A corner approaches a plane no faster than its distance times `braking_per_s`.
+    """
+    return KeepOut(planes, 1.0 / limits.braking_per_s).admitted(twist)
+
+
 def _room(position: Array, limits: Limits, margin_m: float) -> Array:
     """Return the distance to the lower and the upper walls, m, shape (2, 3), never negative."""
     room = np.stack([position - limits.workspace_lower_m, limits.workspace_upper_m - position])
@@ -93,7 +106,14 @@ class Bounds(NamedTuple):
     """Shape (m, n)."""
     most: Array
     """Shape (m,)."""
-    joints: int
+    names: tuple[str, ...]
+    """What each row is of, m of them."""
+
+    @property
+    def hard(self) -> Bounds:
+        """Those that must hold at once: all but the joints' speeds."""
+        kept = [row for row, name in enumerate(self.names) if name != JOINT_SPEED]
+        return Bounds(self.rows[kept], self.most[kept], tuple(self.names[row] for row in kept))
 
     def scale(self, base: Array, more: Array) -> tuple[float, tuple[str, ...]]:
         """Return the largest s, 0 to 1, for which `base` + s `more` is within the bounds, and the
@@ -102,44 +122,49 @@ class Bounds(NamedTuple):
         asked = self.rows @ more
         ratios = np.full_like(asked, np.inf)
         np.divide(self.most - self.rows @ base, asked, out=ratios, where=asked > _NOTHING)
-        names = tuple(self._name(row) for row in np.flatnonzero(ratios < 1.0 - 1e-9).tolist())
+        names = tuple(self.names[row] for row in np.flatnonzero(ratios < 1.0 - 1e-9).tolist())
         return float(np.clip(ratios.min(), 0.0, 1.0)), names
 
-    def _name(self, row: int) -> str:
-        kind, joint = divmod(row, self.joints)
-        if kind < 2:
-            return f"joint_{joint + 1}"
-        if kind < 4:
-            return "joint_speed"
-        return "workspace" if row < 4 * self.joints + 6 else "contact"
 
+def bounds_of(arm: ArmState, limits: Limits, planes: Candidates = NOTHING) -> Bounds:
+    """Return the bounds of joint ranges, joint speeds, walls, planes, nearby links and contacts.
 
-def bounds_of(arm: ArmState, limits: Limits) -> Bounds:
-    """Return the bounds of joint ranges, joint speeds, walls and contacts.
-
-    The walls are asked again here, now of the motion the joints really make: near a singularity
-    damping mixes the parts of a twist.
+    The walls and planes are asked again here, now of the motion the joints really make: near a
+    singularity damping mixes the parts of a twist.
     """
     joints, at = limits.joints, arm.joint_positions
     each = np.eye(len(at))
     to_end = np.concatenate([joints.upper - at, at - joints.lower]) - limits.joint_margin_rad
     to_wall = _room(arm.tool.position, limits, 0.0)
-    linear = arm.jacobian[:3]
+    linear, angular = arm.jacobian[:3], arm.jacobian[3:]
+    # A corner at a lever r from the tool moves at v + ω × r, so that n·(ω × r) = (r × n)·ω.
+    toward_planes = -(planes.normals @ linear + np.cross(planes.levers, planes.normals) @ angular)
+    parts = [
+        (each, limits.braking_per_s * np.maximum(to_end[: len(at)], 0.0), None),
+        (-each, limits.braking_per_s * np.maximum(to_end[len(at) :], 0.0), None),
+        (each, joints.speed, JOINT_SPEED),
+        (-each, joints.speed, JOINT_SPEED),
+        (-linear, limits.braking_per_s * to_wall[0], "workspace"),
+        (linear, limits.braking_per_s * to_wall[1], "workspace"),
+        (toward_planes, limits.braking_per_s * np.maximum(planes.distances, 0.0), "region"),
+        *(
+            (
+                -near.separation_per_joint[None],
+                limits.braking_per_s
+                * np.maximum(np.array([near.distance_m - limits.link_margin_m]), 0.0),
+                "region",
+            )
+            for near in arm.links_near
+        ),
+        *(
+            (-touch.separation_per_joint[None], np.array([_PRESSING_M_S]), "contact")
+            for touch in arm.touches
+        ),
+    ]
     return Bounds(
-        np.vstack(
-            [each, -each, each, -each, -linear, linear]
-            + [-touch.separation_per_joint for touch in arm.touches]
-        ),
-        np.concatenate(
-            [
-                limits.braking_per_s * np.maximum(to_end, 0.0),
-                joints.speed,
-                joints.speed,
-                limits.braking_per_s * to_wall.ravel(),
-                np.full(len(arm.touches), _PRESSING_M_S),
-            ]
-        ),
-        len(at),
+        np.vstack([rows for rows, _, _ in parts]),
+        np.concatenate([most for _, most, _ in parts]),
+        tuple(name or f"joint_{row + 1}" for rows, _, name in parts for row in range(len(rows))),
     )
 
 

@@ -1,27 +1,55 @@
-"""The robot on the bus: Command in, one control cycle a tick, RobotState out.
+"""The robot on the bus: Command in, RobotState out; the arm itself is moved by a process beside it.
 
-Any `ArmDriver` will do; the service is made with the simulated one.
+This is the wire room. It decodes what anybody sends, answers questions, and hands the control room
+nothing but small, valid orders. Whatever happens here, the control room keeps its rate, its limits
+and its regions, and without fresh orders it comes to a stand.
 """
 
 from __future__ import annotations
 
 import logging
-import math
-import time
+import threading
+from collections import OrderedDict
 
-import numpy as np
-
-from hmcs.bus.messages import Ask, Command, Done, Origin, RobotLooks, RobotState
+from hmcs.bus.logs import Seldom
+from hmcs.bus.messages import (
+    Ask,
+    Command,
+    Done,
+    Origin,
+    Pairing,
+    RobotLooks,
+    RobotState,
+    StopRequest,
+)
 from hmcs.bus.service import Service
-from hmcs.bus.session import Bus, Received
+from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.verbs import LOOKS, STOP
 from hmcs.task import load_task
-from hmcs_robot.control import Motion, Standing, follow, stand
-from hmcs_robot.driver import ArmDriver, ArmState
-from hmcs_robot.set_up import limits_of, simulated, tuning_of
+from hmcs_robot.channel import (
+    Closed,
+    Snapshot,
+    pack_order,
+    pack_sign,
+    pack_stop,
+    pack_unpaired,
+    writer_id,
+)
+from hmcs_robot.control_room import ControlRoom, ControlRoomError
+from hmcs_robot.looks import looks_of
+from hmcs_robot.robots import ROBOTS
 from hmcs_robot.settings import RobotSettings
-from hmcs_robot.supervision import Order, Policy, Stop, Supervision, accept, stopped, tick
+from hmcs_robot.supervision import Order
 
-_NS_PER_S = 1_000_000_000
+SIGN_EVERY_S = 0.02
+"""How often the control room gets a sign of life."""
+PAIRING_FRESH_S = 1.0
+"""A pairing not heard again for so long binds nobody any more."""
+PAIRINGS_KEPT = 16
+"""Fixture controllers whose pairing is remembered."""
+ORIGINS_KEPT = 256
+"""Orders whose operator sample is remembered until the control room says that it took them."""
+NS_PER_S = 1_000_000_000
 
 
 class Robot(Service):
@@ -34,154 +62,185 @@ class Robot(Service):
     def __init__(self, settings: RobotSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
-        self._period_ns = round(_NS_PER_S / settings.physics_rate_hz)
-        self._driver: ArmDriver = simulated(self._task, settings)
-        self._limits = limits_of(self._task, self._driver, settings)
-        self._tuning = tuning_of(settings)
-        self._policy = Policy(
-            hang_ns=round(settings.hang_s * _NS_PER_S),
-            settle_ns=round(settings.settle_s * _NS_PER_S),
-        )
-        self._arm = self._driver.read()
-        self._posture = self._arm.joint_positions
-        self._supervision = Supervision()
-        self._motion = Motion(np.zeros_like(self._posture), Standing(), ())
-        self._origin: Origin | None = None
-        self._foreign = 0
-        self._refused = 0
-        self._done_ns = 0
-        self._cycles_per_state = max(1, round(settings.physics_rate_hz / settings.state_rate_hz))
-        self._cycles = 0
-        self._told: Stop | None = None
+        self._seldom = Seldom(log)
+        self._room = ControlRoom(settings, log)
+        self._lock = threading.Lock()
+        self._waiting: Snapshot | None = None
+        self._snapshot: Snapshot | None = None
+        self._origins: OrderedDict[int, Origin | None] = OrderedDict()
+        self._pairings: OrderedDict[str, tuple[str, int]] = OrderedDict()
+        self._joint_names = self._room.joint_names
+        self._number = 0
+        self._foreign_refusals = 0
+        """Refusals that say nothing of the writer that is followed."""
+        self._ended = False
         self._states = bus.publisher(RobotState, bus.keys.robot_state)
 
     def start(self) -> None:
         """Listen and begin to move."""
-        self._done_ns = time.monotonic_ns()
-        self.bus.answer("looks", Ask, self._looks)
-        self.bus.answer("stop", Ask, self._stop)
-        self.bus.subscribe(Command, self.bus.keys.command, self._on_command)
-        self.bus.every(self._period_ns / _NS_PER_S, self._on_tick)
+        bus = self.bus
+        LOOKS.answer(bus, self._looks)
+        STOP.answer(bus, self._on_stop)
+        bus.subscribe(Command, bus.keys.command, self._on_command)
+        bus.subscribe(StopRequest, bus.keys.stop_request, self._on_stop_request)
+        bus.subscribe(Pairing, bus.keys.pairing, self._on_pairing)
+        bus.every(SIGN_EVERY_S, self._give_sign)
+        self._room.read(self._take_snapshot, lambda: bus.soon(self._on_end))
 
     def health(self) -> tuple[bool, str]:
-        """Return that it is well, and whether the arm follows or why it stands."""
-        stop = self._supervision.stop
-        return True, "following commands" if stop == "none" else f"standing: {stop}"
+        """Return whether the arm is controlled, and whether it follows or why it stands."""
+        snapshot = self._snapshot
+        if self._ended:
+            return False, "the control process has ended"
+        if snapshot is None:
+            return True, "the arm has not moved yet"
+        if snapshot.stop == "none":
+            return True, "following commands"
+        return True, f"standing: {snapshot.stop}"
 
     def facts(self) -> dict[str, str]:
         """Return which robot this is."""
         return {
-            "robot": self._driver.name,
+            "robot": self._task.robot.model,
             "task": self._task.name,
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
-            "speed_limit_m_s": f"{self._limits.speed_m_s:g}",
+            "speed_limit_m_s": f"{self._task.robot.speed_limit_m_s:g}",
+            "control_priority": self._room.priority,
+            "late_ticks": str(self._snapshot.late_ticks if self._snapshot else 0),
         }
 
     def close(self) -> None:
-        """Let go of the arm."""
-        self._driver.close()
+        """Bring the arm to a stand and let go of it."""
+        self._room.close()
 
-    def _looks(self, _: Ask) -> RobotLooks:
-        return RobotLooks(robot=self._driver.name, **self._driver.looks()._asdict())
-
-    def _stop(self, _: Ask) -> Done:
-        before = self._supervision.stop
-        self._supervision = stopped(self._supervision)
-        self._log_change(before)
-        return Done(detail="stands until the operator lets go and takes hold again")
+    # --- towards control --------------------------------------------------------------------------
 
     def _on_command(self, received: Received[Command]) -> None:
-        command = received.body
+        command, source = received.body, received.envelope.source
+        other = self._paired_with_another(source.boot, received.received_ns)
+        if other:
+            self._refuse(f"{source.service}/{source.instance} drives another robot: {other}")
+            self._hand_over(pack_unpaired(writer_id(source.boot)))
+            return
         order = Order(
-            writer=received.envelope.source.boot,
+            writer=writer_id(source.boot),
             twist=command.twist,
             valid_for_ns=command.valid_for_ns,
             engaged=command.engaged,
             received_ns=received.received_ns,
         )
-        before = self._supervision.stop
-        self._supervision, verdict = accept(
-            self._supervision, order, time.monotonic_ns(), self._policy
-        )
-        self._log_change(before)
-        if verdict == "accepted":
-            self._origin = received.envelope.origin
-            self._refused = self._invalid()
-        elif verdict == "late":
-            self.bus.counters.count_late(Command.SCHEMA)
-        else:
-            self._foreign += 1
-            source = received.envelope.source
-            self.bus.counters.count_refused(
-                Command.SCHEMA, f"{source.service}/{source.instance} is a second writer"
+        self._number += 1
+        self._origins[self._number] = received.envelope.origin
+        if len(self._origins) > ORIGINS_KEPT:
+            self._origins.popitem(last=False)
+        self._hand_over(pack_order(self._number, order))
+
+    def _on_pairing(self, received: Received[Pairing]) -> None:
+        writer = received.envelope.source.boot
+        self._pairings[writer] = (received.body.robot, received.received_ns)
+        self._pairings.move_to_end(writer)
+        if len(self._pairings) > PAIRINGS_KEPT:
+            self._pairings.popitem(last=False)
+
+    def _paired_with_another(self, writer: str, now_ns: int) -> str:
+        """Return the boot of another robot that this writer drives; empty where it is this one."""
+        robot, said_ns = self._pairings.get(writer, ("", 0))
+        if robot == self.bus.source.boot or now_ns - said_ns > PAIRING_FRESH_S * NS_PER_S:
+            return ""
+        return robot
+
+    def _on_stop(self, _: Ask) -> Done:
+        if self._ended or not self._hand_over(pack_stop()):
+            raise RequestRefusedError(
+                "the control process does not take the stop: it hangs or has ended. Cut the power"
             )
+        return Done(detail="stands until the operator lets go and takes hold again")
 
-    def _on_tick(self) -> None:
-        now_ns = time.monotonic_ns()
-        if now_ns - self._done_ns > self._policy.hang_ns:
-            self._done_ns = now_ns - self._period_ns
-        due = math.floor((now_ns - self._done_ns) / self._period_ns)
-        for _ in range(due):
-            self._cycle(now_ns)
-        self._done_ns += due * self._period_ns
-        stop = self._supervision.stop
-        if due and (self._cycles >= self._cycles_per_state or stop != self._told):
-            self._cycles, self._told = 0, stop
-            following = stop == "none"
-            state = _state(self._driver.name, self._arm, self._motion, self._supervision)
-            self._states.put(state, self._origin if following else None)
+    def _on_stop_request(self, received: Received[StopRequest]) -> None:
+        source = received.envelope.source
+        self.log.warning("asked to stand", extra={"by": f"{source.service}/{source.instance}"})
+        self._hand_over(pack_stop())
 
-    def _cycle(self, now_ns: int) -> None:
-        before = self._supervision.stop
-        self._supervision = tick(
-            self._supervision,
-            self._arm.contacts,
-            now_ns,
-            self._policy,
-            refused=self._invalid() > self._refused,
-        )
-        self._log_change(before)
-        if self._supervision.stop == "none":
-            self._motion = follow(
-                self._arm,
-                self._supervision.twist,
-                self._motion.carried,
-                self._posture,
-                self._limits,
-                self._tuning,
-                self._period_ns / _NS_PER_S,
-            )
-        else:
-            self._motion = stand(self._arm, self._motion.carried, self._tuning)
-        self._driver.move(self._motion.joint_velocities)
-        self._arm = self._driver.read()
-        self._cycles += 1
+    def _give_sign(self) -> None:
+        refused = self.bus.counters.refused[Command.SCHEMA] - self._foreign_refusals
+        self._hand_over(pack_sign(refused))
 
-    def _invalid(self) -> int:
-        """Return how many commands the wire has refused."""
-        return self.bus.counters.refused[Command.SCHEMA] - self._foreign
+    def _hand_over(self, data: bytes) -> bool:
+        try:
+            return self._room.channel.send(data)
+        except Closed:
+            self._on_end()
+            return False
 
-    def _log_change(self, before: str) -> None:
-        stop = self._supervision.stop
-        if stop != before:
+    # --- back from control ------------------------------------------------------------------------
+
+    def _take_snapshot(self, snapshot: Snapshot) -> None:
+        # The newest alone waits for its turn: a loop that hangs must not pile them up.
+        with self._lock:
+            waiting, self._waiting = self._waiting, snapshot
+        if waiting is None:
+            self.bus.soon(self._on_newest)
+
+    def _on_newest(self) -> None:
+        with self._lock:
+            snapshot, self._waiting = self._waiting, None
+        if snapshot is not None:
+            self._on_snapshot(snapshot)
+
+    def _on_snapshot(self, snapshot: Snapshot) -> None:
+        before, self._snapshot = self._snapshot, snapshot
+        if before is None or snapshot.stop != before.stop:
+            following = snapshot.stop == "none"
             self.log.info(
-                "following" if stop == "none" else "standing",
-                extra={} if stop == "none" else {"reason": stop},
+                "following" if following else "standing",
+                extra={} if following else {"reason": snapshot.stop},
+            )
+        self._count(before, snapshot)
+        origin = self._origins.get(snapshot.taken) if snapshot.stop == "none" else None
+        self._states.put(self._state(snapshot), origin)
+
+    def _count(self, before: Snapshot | None, snapshot: Snapshot) -> None:
+        late = snapshot.late_orders - (before.late_orders if before else 0)
+        foreign = snapshot.foreign_orders - (before.foreign_orders if before else 0)
+        self.bus.counters.late[Command.SCHEMA] += late
+        if foreign:
+            self._refuse("a second writer, while the first one is fresh", foreign)
+        if before is not None and snapshot.late_ticks > before.late_ticks:
+            self._seldom.warning("late", "late control ticks", count=snapshot.late_ticks)
+
+    def _on_end(self) -> None:
+        if not self._ended:
+            self._ended = True
+            raise ControlRoomError(
+                "the control process has ended by itself: the arm is not controlled any more"
             )
 
+    def _refuse(self, reason: str, count: int = 1) -> None:
+        self._foreign_refusals += count
+        self.bus.counters.refused[Command.SCHEMA] += count
+        self._seldom.warning("refused", "command refused", reason=reason)
 
-def _state(robot: str, arm: ArmState, motion: Motion, supervision: Supervision) -> RobotState:
-    return RobotState(
-        robot=robot,
-        joint_positions=arm.joint_positions,
-        joint_velocities=arm.joint_velocities,
-        tool_position=arm.tool.position,
-        tool_orientation=arm.tool.orientation,
-        tool_twist=arm.tool_twist,
-        reference_twist=motion.reference_twist,
-        nearest_obstacle=arm.nearest.name if arm.nearest else "",
-        nearest_distance_m=arm.nearest.distance_m if arm.nearest else None,
-        contacts=arm.contacts,
-        stop=supervision.stop,
-        limited=motion.limited,
-    )
+    # --- what is said -----------------------------------------------------------------------------
+
+    def _state(self, snapshot: Snapshot) -> RobotState:
+        return RobotState(
+            robot=self._task.robot.model,
+            joint_names=self._joint_names,
+            joint_positions=snapshot.joint_positions,
+            joint_velocities=snapshot.joint_velocities,
+            tool_position=snapshot.tool_position,
+            tool_orientation=snapshot.tool_orientation,
+            tool_twist=snapshot.tool_twist,
+            reference_twist=snapshot.reference_twist,
+            nearest_obstacle=snapshot.nearest_obstacle,
+            nearest_distance_m=snapshot.nearest_distance_m,
+            contacts=snapshot.contacts,
+            stop=snapshot.stop,
+            limited=snapshot.limited,
+            region_distance_m=snapshot.region_distance_m,
+            late_ticks=snapshot.late_ticks,
+        )
+
+    def _looks(self, _: Ask) -> RobotLooks:
+        looks = looks_of(ROBOTS[self._task.robot.model].urdf, self._joint_names)
+        return RobotLooks(robot=self._task.robot.model, **looks._asdict())

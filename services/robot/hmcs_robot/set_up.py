@@ -10,6 +10,7 @@ from hmcs_robot.driver import ArmDriver, Pose
 from hmcs_robot.limits import Limits
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation
+from hmcs_robot.supervision import Policy
 
 
 def tuning_of(settings: RobotSettings) -> Tuning:
@@ -17,11 +18,21 @@ def tuning_of(settings: RobotSettings) -> Tuning:
     return Tuning(damping=settings.damping, correction_per_s=settings.correction_per_s)
 
 
+def policy_of(settings: RobotSettings) -> Policy:
+    """Return how patient its supervision is."""
+    return Policy(
+        longest_valid_ns=round(settings.command_valid_for_ms * 1e6),
+        late_tick_ns=round(settings.late_tick_s * 1e9),
+        hang_ns=round(settings.hang_s * 1e9),
+        settle_ns=round(settings.settle_s * 1e9),
+    )
+
+
 def simulated(task: Task, settings: RobotSettings) -> Simulation:
     """Return the arm of a task, simulated; raises UserError as `Simulation` does."""
     start = Pose(np.array(task.robot.tool_start_m), np.array(task.robot.tool_orientation_xyzw))
     return Simulation(
-        Scene(task.robot.model, start, task.workspace.obstacles),
+        Scene(task.robot.model, start, task.workspace.obstacles, task.workspace.forbidden),
         1.0 / settings.physics_rate_hz,
         gui=settings.gui,
         reach_m=settings.search_m,

@@ -25,11 +25,19 @@ class RobotSettings(ServiceSettings):
     braking_per_s: float = Field(default=8.0, gt=0.0, le=20.0)
     """Speed allowed per distance left to a wall of the workspace or the end of a joint's range."""
     acceleration_limit_m_s2: float = Field(default=10.0, gt=0.0)
-    """Of the tool while it follows; a stop is as fast as the motors can brake."""
+    """Of the tool while it follows and while it comes to a stand; after a collision, or a control
+    cycle that came too late, it brakes as fast as its motors can."""
     angular_acceleration_limit_rad_s2: float = Field(default=20.0, gt=0.0)
+    command_valid_for_ms: float = Field(default=80.0, gt=0.0, le=1000.0)
+    """No command counts longer after its arrival, whatever its sender says."""
+    late_tick_s: float = Field(default=0.05, gt=0.0)
+    """A control cycle that comes so much later than the one before stops the arm."""
     hang_s: float = Field(default=0.1, gt=0.0)
-    """A longer pause between two control cycles is a hang of this process: the arm stops."""
+    """A longer silence of the process that hears commands is its hang: the arm stops."""
     settle_s: float = Field(default=0.25, ge=0.0)
     """How long commands are refused after a hang, while what queued up meanwhile drains."""
+    realtime_priority: int = Field(default=40, ge=0, le=98)
+    """SCHED_FIFO priority of the control cycle where the user may have it, else a nicer place among
+    the others; 0 leaves it as it is."""
     search_m: float = Field(default=0.2, gt=0.0)
     """Within this distance the nearest obstacle is looked for."""

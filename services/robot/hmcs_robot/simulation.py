@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pybullet
 
 from hmcs.errors import UserError
-from hmcs.task import Obstacle
+from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm
-from hmcs_robot.driver import ArmState, Array, Nearest, Pose, Touch
+from hmcs_robot.bodies import add_obstacle, add_region
+from hmcs_robot.driver import ArmState, Array, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
 from hmcs_robot.looks import Looks, looks_of
 from hmcs_robot.robots import ROBOTS
@@ -21,6 +22,9 @@ _TOUCHING_M = 0.0005
 """Nearer than this counts as contact: the solver keeps bodies about so far apart."""
 _SELF_MARGIN_M = 0.005
 """Links of the arm itself are kept so far apart: nothing in the physics would."""
+_LINKS_WITHIN_M = 0.08
+"""Links nearer to a forbidden region than this are slowed down: farther than an arm that moves at
+0.25 m/s goes while it slows to a stand."""
 ITSELF = "itself"
 """What an arm touches whose own links meet."""
 
@@ -37,6 +41,8 @@ class Scene(NamedTuple):
     start: Pose
     """Of the tool."""
     obstacles: tuple[Obstacle, ...]
+    forbidden: tuple[ForbiddenRegion, ...] = ()
+    """Regions that the links are kept out of; they are no bodies to collide with."""
 
 
 class Simulation:
@@ -58,6 +64,7 @@ class Simulation:
         pybullet.setTimeStep(period_s, physicsClientId=self._client)
         self.arm = Arm(ROBOTS[scene.robot], self._client)
         self.limits = self.arm.limits
+        self.joint_names = self.arm.joint_names
         for link in range(pybullet.getNumJoints(self.arm.body, physicsClientId=self._client)):
             pybullet.changeDynamics(
                 self.arm.body,
@@ -68,7 +75,10 @@ class Simulation:
                 physicsClientId=self._client,
             )
         self._obstacles = {
-            _add(obstacle, self._client): obstacle.name for obstacle in scene.obstacles
+            add_obstacle(obstacle, self._client): obstacle.name for obstacle in scene.obstacles
+        }
+        self._regions = {
+            add_region(region, self._client): region.name for region in scene.forbidden
         }
         self.arm.place(self.home)
         for joint in self.arm.other_joints:
@@ -93,6 +103,13 @@ class Simulation:
                 f"robot {scene.robot} touches {', '.join(touched)} at the start pose of the task: "
                 "move the obstacle or choose another tool_start_m"
             )
+        inside = sorted({near.name for near in self._links_near(self.home) if near.distance_m < 0})
+        if inside:
+            self.close()
+            raise StartPoseError(
+                f"links of robot {scene.robot} reach into forbidden region {', '.join(inside)} at "
+                "the start pose of the task: move the region or choose another tool_start_m"
+            )
 
     def read(self) -> ArmState:
         """Return where the arm is now."""
@@ -108,6 +125,7 @@ class Simulation:
             self.arm.jacobian(positions),
             nearest,
             touches,
+            self._links_near(positions),
         )
 
     def move(self, joint_velocities: Array) -> None:
@@ -154,6 +172,20 @@ class Simulation:
                     )
         return nearest, (*touches, *self._meeting_links(positions))
 
+    def _links_near(self, positions: Array) -> tuple[LinkNear, ...]:
+        near = []
+        for body, name in self._regions.items():
+            for point in pybullet.getClosestPoints(
+                self.arm.body, body, _LINKS_WITHIN_M, physicsClientId=self._client
+            ):
+                link, on_arm, normal, distance = point[3], point[5], point[7], point[8]
+                if link in self.arm.moving_links:
+                    parting = self.arm.separation_per_joint(
+                        link, np.array(on_arm), np.array(normal), positions
+                    )
+                    near.append(LinkNear(name, distance, parting))
+        return tuple(near)
+
     def _meeting_links(self, positions: Array) -> Iterator[Touch]:
         for one, other in self.arm.apart:
             for point in pybullet.getClosestPoints(
@@ -192,30 +224,3 @@ def _connect(gui: bool) -> int:
     if client < 0:
         raise UserError("no window could be opened: is there a display? Run without gui")
     return client
-
-
-def _add(obstacle: Obstacle, client: int) -> int:
-    collision: dict[str, Any]
-    visual: dict[str, Any]
-    if obstacle.size_m is not None:
-        kind = pybullet.GEOM_BOX
-        collision = visual = {"halfExtents": [length / 2 for length in obstacle.size_m]}
-    elif obstacle.length_m is not None:
-        kind = pybullet.GEOM_CYLINDER
-        collision = {"radius": obstacle.radius_m, "height": obstacle.length_m}
-        # PyBullet names the same length differently.
-        visual = {"radius": obstacle.radius_m, "length": obstacle.length_m}
-    else:
-        kind = pybullet.GEOM_SPHERE
-        collision = visual = {"radius": obstacle.radius_m}
-    body: int = pybullet.createMultiBody(
-        0,
-        pybullet.createCollisionShape(kind, **collision, physicsClientId=client),
-        pybullet.createVisualShape(
-            kind, **visual, rgbaColor=[0.45, 0.55, 0.65, 1], physicsClientId=client
-        ),
-        list(obstacle.position_m),
-        list(obstacle.orientation_xyzw),
-        physicsClientId=client,
-    )
-    return body

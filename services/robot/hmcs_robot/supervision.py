@@ -1,13 +1,15 @@
-"""Which command is in force: a state machine that is told the time and knows no wire.
+"""Which command is in force: a state machine without a clock or a wire of its own.
 
 The arm follows a command only while its writer is fresh and engaged. Everything else makes it
 stand, and after every stop it moves again only once it has seen `engaged` False and then True, so
 also after the start and when another writer takes over. A writer is one boot of one process. While
-a writer is fresh the commands of any other are refused.
+a writer is fresh the commands of any other are refused. How long a command counts is the robot's to
+say: no sender makes it count longer than `Policy.longest_valid_ns`.
 
-The robot's own hang (a tick that comes later than `Policy.hang_ns`) is a stop as well: nothing it
-knows is fresh any more. What queued up meanwhile is stamped on arrival only now and looks fresh
-without being so; hence commands are refused for another `Policy.settle_ns` after a hang.
+Two things can fall behind. A control tick that comes later than `Policy.late_tick_ns` is a stop. A
+wire room that has given no sign of life for `Policy.hang_ns` hung: what queued up meanwhile is
+stamped on arrival only now and looks fresh without being so; hence commands are refused for another
+`Policy.settle_ns` after that.
 """
 
 from __future__ import annotations
@@ -26,20 +28,37 @@ Stop = Literal[
     "stale_command",
     "refused_command",
     "second_writer",
+    "not_paired",
+    "late_tick",
     "collision",
     "asked",
 ]
-_LASTING: tuple[Stop, ...] = ("stale_command", "refused_command", "collision", "asked")
+_LASTING: tuple[Stop, ...] = (
+    "stale_command",
+    "refused_command",
+    "not_paired",
+    "late_tick",
+    "collision",
+    "asked",
+)
 """Stops that stay the reason when the commands go stale."""
+AT_ONCE: tuple[Stop, ...] = ("collision", "late_tick")
+"""Stops as hard as the arm can brake; all others are within its acceleration limits."""
 Verdict = Literal["accepted", "second_writer", "late"]
+Writer = str | bytes
+"""Something that is the same for all commands of one boot of one process, and for no others."""
 
 
 @dataclass(frozen=True)
 class Policy:
     """How patient the supervision is."""
 
+    longest_valid_ns: int = 80_000_000
+    """No command counts longer after its arrival, whatever it says."""
+    late_tick_ns: int = 50_000_000
+    """A longer time between two control ticks is a stop."""
     hang_ns: int = 100_000_000
-    """A longer time between two ticks is a hang of the robot's own process."""
+    """A longer time without a sign of life of the wire room is its hang."""
     settle_ns: int = 250_000_000
     """How long commands are refused after a hang."""
 
@@ -48,8 +67,7 @@ class Policy:
 class Order:
     """A command as the supervision sees it."""
 
-    writer: str
-    """Boot of the process that wrote it."""
+    writer: Writer
     twist: Array
     """m/s and rad/s, shape (6,), finite."""
     valid_for_ns: int
@@ -66,7 +84,7 @@ class Supervision:
     """Why the arm stands; `none` while it follows `twist`."""
     armed: bool = False
     """`engaged` False was seen since the last stop: True may now start the motion."""
-    writer: str | None = None
+    writer: Writer | None = None
     twist: Array = field(default_factory=lambda: np.zeros(6))
     """Zero unless the arm follows it, shape (6,)."""
     fresh_until_ns: int = 0
@@ -74,17 +92,27 @@ class Supervision:
     deaf_until_ns: int = 0
     """Until when commands are refused after a hang."""
     ticked_ns: int | None = None
-    """When it was last told the time."""
+    """When the last control tick was."""
+    heard_ns: int | None = None
+    """When the wire room last gave a sign of life."""
     contacts: tuple[str, ...] = ()
     """What the arm touched at the last tick."""
+
+
+def heard(now: Supervision, time_ns: int, policy: Policy) -> Supervision:
+    """Return the supervision after a sign of life of the wire room."""
+    if now.heard_ns is not None and time_ns - now.heard_ns > policy.hang_ns:
+        halted = _halt(now, "stale_command") if now.writer is not None else now
+        now = replace(halted, deaf_until_ns=time_ns + policy.settle_ns)
+    return replace(now, heard_ns=time_ns)
 
 
 def accept(
     now: Supervision, order: Order, time_ns: int, policy: Policy
 ) -> tuple[Supervision, Verdict]:
     """Return the supervision after `order`, seen at `time_ns`, and what became of the order."""
-    now = _expired(_after_hang(now, time_ns, policy), time_ns, "stale_command")
-    fresh_until_ns = order.received_ns + order.valid_for_ns
+    now = _expired(heard(now, time_ns, policy), time_ns, "stale_command")
+    fresh_until_ns = order.received_ns + min(order.valid_for_ns, policy.longest_valid_ns)
     if order.received_ns < now.deaf_until_ns or fresh_until_ns < time_ns:
         return now, "late"
     if order.writer != now.writer:
@@ -115,8 +143,10 @@ def tick(
     A contact stops the arm when it is made, not while it lasts: after a re-engage the arm can be
     driven away from what it touches.
     """
-    now = _after_hang(now, time_ns, policy)
     now = _expired(now, time_ns, "refused_command" if refused else "stale_command")
+    late = now.ticked_ns is not None and time_ns - now.ticked_ns > policy.late_tick_ns
+    if late and now.stop == "none":
+        now = _halt(now, "late_tick")
     if now.stop == "none" and set(contacts) - set(now.contacts):
         now = _halt(now, "collision")
     return replace(now, contacts=contacts, ticked_ns=time_ns)
@@ -127,11 +157,9 @@ def stopped(now: Supervision) -> Supervision:
     return _halt(now, "asked")
 
 
-def _after_hang(now: Supervision, time_ns: int, policy: Policy) -> Supervision:
-    if now.ticked_ns is None or time_ns - now.ticked_ns <= policy.hang_ns:
-        return now
-    halted = _halt(now, "stale_command") if now.writer is not None else now
-    return replace(halted, deaf_until_ns=time_ns + policy.settle_ns, ticked_ns=time_ns)
+def unpaired(now: Supervision, writer: Writer) -> Supervision:
+    """Return the supervision after a writer was heard to drive another robot."""
+    return _halt(now, "not_paired") if now.writer == writer else now
 
 
 def _expired(now: Supervision, time_ns: int, stop: Stop) -> Supervision:

@@ -14,17 +14,27 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from hmcs.bus.config import BusSettings
 from hmcs.bus.keys import ANY
-from hmcs.bus.messages import Ask, Command, Done, Origin, RobotState
+from hmcs.bus.messages import (
+    Ask,
+    Command,
+    Done,
+    Origin,
+    Pairing,
+    RobotState,
+    StopRequest,
+)
 from hmcs.bus.router import open_router
+from hmcs.bus.service import CannotGoOnError
 from hmcs.bus.session import Bus, Publisher, Received
 from hmcs_robot.service import Robot
 from hmcs_robot.settings import RobotSettings
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 TASK = """
 format: hmcs-task/1
 name: push
@@ -51,7 +61,15 @@ class Cell:
         self.settings = BusSettings(router=router)
         self.buses: list[Bus] = []
         self.bus = self.open("robot")
-        settings = RobotSettings(router=router, task=str(task), hang_s=hang_s)
+        settings = RobotSettings(
+            router=router,
+            task=str(task),
+            # Patient, so that a busy machine is not taken for a hang or a late command.
+            hang_s=hang_s,
+            late_tick_s=5.0,
+            command_valid_for_ms=500,
+            realtime_priority=0,
+        )
         self.robot = Robot(settings, self.bus, logging.getLogger("robot"))
         self.robot.start()
         self.said: list[RobotState] = []
@@ -124,7 +142,6 @@ def task(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def cell(router: str, task: Path, request: pytest.FixtureRequest) -> Iterator[Cell]:
-    # Patient by default, so that a busy machine is not taken for a hang.
     made = Cell(router, task, hang_s=getattr(request, "param", 5.0))
     yield made
     made.close()
@@ -136,6 +153,8 @@ def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cel
     assert begun.robot == "puma560"
     assert begun.tool_position == pytest.approx([0.6, 0.0, 0.5], abs=1e-4)
     assert begun.nearest_obstacle == "wall"
+    assert begun.joint_names[0] == "waist"
+    assert len(begun.joint_names) == len(begun.joint_positions) == 6
     cell.engage(-0.1)
     cell.until(lambda s: s.tool_position[1] < -0.03, lambda: cell.say(True, -0.1))
     moving = cell.said[-1]
@@ -205,7 +224,7 @@ def test_what_is_no_command_is_refused_and_told_as_the_reason(cell: Cell) -> Non
 
 
 @pytest.mark.parametrize("cell", [0.25], indirect=True)
-def test_a_hang_of_its_own_stops_it(cell: Cell) -> None:
+def test_a_hang_of_the_wire_room_stops_it_and_what_queued_up_moves_nothing(cell: Cell) -> None:
     cell.engage(-0.05)
     began = time.monotonic()
     while time.monotonic() - began < 0.3:
@@ -213,7 +232,67 @@ def test_a_hang_of_its_own_stops_it(cell: Cell) -> None:
         for bus in cell.buses[1:]:
             bus.pump(0.005)
     cell.until(lambda s: s.stop == "stale_command", lambda: cell.say(True, -0.05))
-    assert cell.bus.counters.late["command"] > 0
+    cell.until(lambda _: cell.bus.counters.late["command"] > 0, lambda: cell.say(True, -0.05))
+
+
+def test_a_published_stop_needs_no_answer_and_holds(cell: Cell) -> None:
+    cell.engage(-0.1)
+    watcher = cell.open("operator")
+    stops = watcher.publisher(StopRequest, watcher.keys.stop_request)
+    stops.put(StopRequest(reason="the test wants it"))
+    cell.until(lambda s: s.stop == "asked", lambda: cell.say(True, -0.1))
+    for _ in range(20):
+        cell.until(lambda _: True, lambda: cell.say(True, -0.1))
+    assert cell.said[-1].stop == "asked"
+
+
+def test_a_fixture_that_drives_another_robot_moves_nothing_here(cell: Cell) -> None:
+    cell.engage(-0.1)
+    bus = next(bus for bus in cell.buses if bus.source.service == "fixture")
+    pairings = bus.publisher(Pairing, bus.keys.pairing)
+
+    def elsewhere() -> None:
+        paired = Pairing(device="", device_instance="", robot="other", robot_instance="other")
+        pairings.put(paired)
+        cell.say(True, -0.1)
+
+    cell.until(lambda s: s.stop == "not_paired", elsewhere)
+    assert cell.bus.counters.refused["command"] > 0
+    assert cell.robot.health()[1].startswith("standing: not_paired")
+
+
+def test_a_control_process_that_ends_is_told_and_ends_the_robot(cell: Cell) -> None:
+    cell.until(lambda _: True)
+    cell.robot._room._process.kill()
+
+    def ended() -> bool:
+        try:
+            cell.bus.pump(0.01)
+        except CannotGoOnError:
+            return True
+        return False
+
+    began = time.monotonic()
+    while not ended():
+        assert time.monotonic() - began < DEADLINE_S
+    assert cell.robot.health() == (False, "the control process has ended")
+
+
+def test_a_robot_that_is_killed_leaves_no_control_process(router: str, task: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hmcs_robot", "--router", router, "--task", str(task)]
+    )
+    try:
+        began = time.monotonic()
+        while not (children := psutil.Process(process.pid).children()):
+            assert time.monotonic() - began < DEADLINE_S
+        process.kill()
+        gone, alive = psutil.wait_procs(children, DEADLINE_S)
+        assert not alive
+        assert gone
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_a_task_out_of_its_reach_ends_the_process_with_2_and_says_why(
@@ -228,7 +307,7 @@ def test_a_task_out_of_its_reach_ends_the_process_with_2_and_says_why(
         [sys.executable, "-m", "hmcs_robot", "--router", router, "--task", str(task)],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=60,
         check=False,
     )
     assert ended.returncode == 2
@@ -251,6 +330,6 @@ def test_sigterm_ends_it_cleanly(router: str, task: Path) -> None:
                 bus.pump(0.05)
             assert heard
             process.send_signal(signal.SIGTERM)
-            assert process.wait(timeout=5) == 0
+            assert process.wait(timeout=30) == 0
         finally:
             process.kill()

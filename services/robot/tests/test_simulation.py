@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hmcs.task import Obstacle
+from hmcs.task import ForbiddenRegion, Obstacle
+from hmcs_robot.control import Following, Standing, Tuning, follow
 from hmcs_robot.driver import Pose, Touch
 from hmcs_robot.kinematics import UnreachablePoseError
-from hmcs_robot.limits import bounds_of
+from hmcs_robot.limits import Limits, bounds_of
 from hmcs_robot.simulation import Scene, Simulation, StartPoseError
 
 WALL = Obstacle(name="wall", shape="box", position_m=(0.60, 0.25, 0.50), size_m=(0.3, 0.1, 0.3))
@@ -143,3 +144,52 @@ def test_links_that_meet_cannot_be_pressed_together(bench: Any) -> None:
     pressing, opening = -0.3 * parting, 0.3 * parting
     assert bounds.scale(np.zeros_like(pressing), pressing)[0] < 0.01
     assert bounds.scale(np.zeros_like(opening), opening)[0] == 1.0
+
+
+def region(**fields: Any) -> ForbiddenRegion:
+    return ForbiddenRegion.model_validate({"name": "region", **fields})
+
+
+AROUND_THE_ELBOW = {
+    "sphere": {"shape": "sphere", "position_m": [0.25, 0.35, 0.55], "radius_m": 0.1},
+    "box": {"shape": "box", "position_m": [0.25, 0.4, 0.55], "size_m": [0.3, 0.2, 0.3]},
+    "capsule": {
+        "shape": "capsule", "position_m": [0.25, 0.4, 0.2], "end_m": [0.25, 0.4, 0.9],
+        "radius_m": 0.1,
+    },
+    "plane": {"shape": "plane", "position_m": [0, 0.35, 0], "normal": [0, -1, 0]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", AROUND_THE_ELBOW)
+def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
+    starts: dict[str, Pose], period_s: float, shape: str
+) -> None:
+    start = starts["puma560"]
+    scene = Scene("puma560", start, (), (region(**AROUND_THE_ELBOW[shape]),))
+    simulation = Simulation(scene, period_s)
+    limits = Limits(simulation.limits, 0.25, 0.5, start.position - 2, start.position + 2)
+    carried: Following | Standing = Standing()
+    nearest = []
+    try:
+        for cycle in range(1200):
+            arm = simulation.read()
+            nearest.append(min((near.distance_m for near in arm.links_near), default=np.inf))
+            # Round about, so that every link comes near.
+            angle = cycle / 200
+            twist = np.array([0.2 * np.cos(angle), 0.25, 0.2 * np.sin(angle), 0, 0, 0])
+            motion = follow(arm, twist, carried, simulation.home, limits, Tuning(), period_s)
+            carried = motion.carried
+            simulation.move(motion.joint_velocities)
+    finally:
+        simulation.close()
+    assert min(nearest) < 0.02
+    assert min(nearest) > -1e-4
+
+
+def test_a_link_in_a_forbidden_region_at_the_start_is_told(
+    starts: dict[str, Pose], period_s: float
+) -> None:
+    inside = region(shape="sphere", position_m=[0.3, 0.15, 0.6], radius_m=0.3)
+    with pytest.raises(StartPoseError, match="forbidden region region"):
+        Simulation(Scene("puma560", starts["puma560"], (), (inside,)), period_s)

@@ -7,10 +7,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs_robot.supervision import Order, Policy, Supervision, Verdict, accept, stopped, tick
+from hmcs_robot.supervision import (
+    Order,
+    Policy,
+    Supervision,
+    Verdict,
+    accept,
+    heard,
+    stopped,
+    tick,
+    unpaired,
+)
 
 MS = 1_000_000
-POLICY = Policy(hang_ns=100 * MS, settle_ns=250 * MS)
+POLICY = Policy(
+    longest_valid_ns=100 * MS, late_tick_ns=10_000 * MS, hang_ns=100 * MS, settle_ns=250 * MS
+)
 TWIST = np.array([0.1, 0, 0, 0, 0, 0.2])
 
 
@@ -26,6 +38,7 @@ class Story:
         return verdict
 
     def tick(self, at_ms: int, *contacts: str, refused: bool = False) -> str:
+        self.now = heard(self.now, at_ms * MS, POLICY)
         self.now = tick(self.now, contacts, at_ms * MS, POLICY, refused=refused)
         return self.now.stop
 
@@ -147,7 +160,7 @@ def test_whoever_asks_stops_it_until_the_operator_lets_go_and_takes_hold_again()
     assert story.tick(201) == "none"
 
 
-def test_a_hang_of_its_own_stops_and_refuses_what_queued_up() -> None:
+def test_a_hang_of_the_wire_room_stops_and_refuses_what_queued_up() -> None:
     story = Story()
     story.engage()
     story.tick(50)
@@ -165,6 +178,41 @@ def test_a_hang_of_its_own_stops_and_refuses_what_queued_up() -> None:
     story.order(770, False)
     story.order(780, True)
     assert story.tick(781) == "none"
+
+
+def test_no_command_counts_longer_than_the_robot_lets_it() -> None:
+    story = Story()
+    story.tick(0)
+    story.order(0, False, valid_ms=1000)
+    story.order(0, True, valid_ms=1000)
+    assert story.tick(100) == "none"
+    assert story.tick(101) == "stale_command"
+
+
+def test_a_late_control_tick_is_a_stop_that_only_a_new_engage_ends() -> None:
+    patient = Policy(late_tick_ns=50 * MS, longest_valid_ns=100 * MS)
+    now = Supervision()
+    for at_ms, engaged in ((0, False), (1, True)):
+        now, _ = accept(now, Order("a", TWIST, 100 * MS, engaged, at_ms * MS), at_ms * MS, patient)
+    now = tick(now, (), 1 * MS, patient)
+    now = tick(now, (), 51 * MS, patient)
+    assert now.stop == "none"
+    now, _ = accept(now, Order("a", TWIST, 100 * MS, True, 60 * MS), 60 * MS, patient)
+    now = tick(now, (), 102 * MS, patient)
+    assert now.stop == "late_tick"
+    now, _ = accept(now, Order("a", TWIST, 100 * MS, True, 103 * MS), 103 * MS, patient)
+    assert tick(now, (), 104 * MS, patient).stop == "late_tick"
+
+
+def test_a_writer_that_drives_another_robot_stops_this_one_and_others_do_not() -> None:
+    story = Story()
+    story.engage()
+    story.now = unpaired(story.now, "b")
+    assert story.tick(1) == "none"
+    story.now = unpaired(story.now, "a")
+    assert story.tick(2) == "not_paired"
+    story.order(3, True)
+    assert story.tick(4) == "not_paired"
 
 
 orders = st.tuples(st.sampled_from("ab"), st.booleans(), st.sampled_from([20, 100]))

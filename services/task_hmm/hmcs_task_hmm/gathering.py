@@ -1,6 +1,7 @@
 """Gathering: evidence of several classifiers, step by step, until all of it is there or time is up.
 
-Pure: times are passed in. Steps are released in order, each once.
+Pure: times are passed in, and all of them are times of arrival: evidence that had arrived in time
+counts, however late a busy process comes to handle it. Steps are released in order, each once.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ class Gathering:
         self._early_until_ns: dict[int, int] = {}
         """Of steps released before their deadline, oldest first: until when evidence is in time."""
         self._next = 0
+        self._handled_until_ns = -1
+        """Whatever arrived before has been handled."""
 
     def restart(self, index: int) -> None:
         """Forget everything; step `index` is the next."""
@@ -56,6 +59,7 @@ class Gathering:
         duplicate up to the step's deadline, as a second classifier sends at every step, and late
         after that.
         """
+        self.caught_up(now_ns)
         step = evidence.step
         if step < self._next:
             return "duplicate" if now_ns <= self._early_until_ns.get(step, -1) else "late"
@@ -67,14 +71,22 @@ class Gathering:
         self._parts.setdefault(step, []).append(_only(evidence, fresh))
         return "taken"
 
+    def caught_up(self, now_ns: int) -> None:
+        """Note that whatever arrived before `now_ns` has been handled."""
+        self._handled_until_ns = max(self._handled_until_ns, now_ns)
+
     def release(self, now_ns: int) -> Released | None:
-        """Return the next step if its evidence is complete or its deadline has passed."""
+        """Return the next step at `now_ns` if its evidence is complete or its deadline has passed.
+
+        The deadline has passed once everything has been handled that arrived before it; that the
+        clock is past it means nothing while this process is behind with its messages.
+        """
         step = self._next
         if step not in self._due_ns:
             return None
         complete = self._needed <= self._covered.get(step, set())
         due_ns = self._due_ns[step]
-        if not complete and now_ns < due_ns:
+        if not complete and self._handled_until_ns < due_ns:
             return None
         self._next = step + 1
         self._due_ns.pop(step)

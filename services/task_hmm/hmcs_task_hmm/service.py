@@ -11,6 +11,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
+from hmcs.model_signing import signed_by
 from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.recognition.model_file import load_model
 from hmcs.translation import belief_message, step_of
@@ -29,7 +30,7 @@ class TaskHmm(Service):
 
     def __init__(self, settings: TaskHmmSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model)
+        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
         self._recognizer = TaskRecognizer(self._model)
         self._warming: LayeredRecognizer | None = None
         self._gathering = Gathering(
@@ -119,7 +120,16 @@ class TaskHmm(Service):
         if self._timer is not None:
             self._timer.cancel()
         due_ns = self._gathering.due_ns
-        self._timer = None if due_ns is None else self.bus.at(due_ns, self._release)
+        self._timer = None if due_ns is None else self.bus.at(due_ns, self._on_deadline)
+
+    def _on_deadline(self) -> None:
+        # What arrived before the deadline may still wait to be handled: it goes first.
+        now_ns = time.monotonic_ns()
+        self.bus.soon(lambda: self._on_caught_up(now_ns))
+
+    def _on_caught_up(self, now_ns: int) -> None:
+        self._gathering.caught_up(now_ns)
+        self._release()
 
     def _named(self, gestemes: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self._model.gesteme_names[g] for g in gestemes)

@@ -45,8 +45,10 @@ def test_past_the_deadline_a_step_is_released_with_what_came():
     g.begin(0, now_ns=100)
     g.add(evidence(0, {1}), 101)
     assert g.due_ns == 120
-    assert g.release(now_ns=119) is None
-    released = g.release(now_ns=120)
+    g.caught_up(119)
+    assert g.release(now_ns=500) is None
+    g.caught_up(120)
+    released = g.release(now_ns=500)
     assert released is not None
     assert released.overdue
     assert released.evidence.gestemes == (1,)
@@ -55,6 +57,7 @@ def test_past_the_deadline_a_step_is_released_with_what_came():
 def test_with_no_classifier_at_all_a_step_is_released_empty():
     g = gathering()
     g.begin(0, now_ns=0)
+    g.caught_up(DEADLINE_NS)
     released = g.release(now_ns=DEADLINE_NS)
     assert released is not None
     assert released.evidence.gestemes == ()
@@ -84,8 +87,27 @@ def test_evidence_that_overtakes_its_step_waits_for_it():
 def test_evidence_for_a_step_released_at_its_deadline_is_late():
     g = gathering()
     g.begin(0, now_ns=0)
+    g.caught_up(DEADLINE_NS)
     g.release(now_ns=DEADLINE_NS)
     assert g.add(evidence(0, {0}), DEADLINE_NS + 1) == "late"
+
+
+@given(st.lists(st.integers(0, DEADLINE_NS - 1), min_size=1, max_size=8), st.integers(0, 10**6))
+def test_evidence_that_arrived_in_time_counts_however_late_it_is_handled(delays, behind):
+    g, period = gathering(), 10
+    mail = []
+    for t, delay in enumerate(delays):
+        mail += [(t * period, "step", t), (t * period + delay, "evidence", t)]
+    released = []
+    for at, kind, t in sorted(mail):
+        if kind == "step":
+            g.begin(t, at)
+        else:
+            assert g.add(evidence(t, {0, 1, 2}), at) == "taken"
+        while (item := g.release(mail[-1][0] + behind)) is not None:
+            released.append(item)
+    assert [item.evidence.step for item in released] == list(range(len(delays)))
+    assert not any(item.overdue for item in released)
 
 
 def test_the_second_of_two_classifiers_is_no_late_one_unless_the_deadline_has_passed():
@@ -133,6 +155,7 @@ def test_every_step_is_released_once_and_in_order_whatever_comes_when(data):
             assert (verdict == "late") <= (t < len(released))
         while (item := g.release(now_ns)) is not None:
             released.append(item)
+    g.caught_up(now_ns + DEADLINE_NS)
     while (item := g.release(now_ns + DEADLINE_NS)) is not None:
         released.append(item)
     assert [item.evidence.step for item in released] == list(range(steps))

@@ -99,7 +99,7 @@ def write_found(found: Found, task_file: Path) -> Iterator[str]:
         said: How = how_labeled(content)
         stretches = stretches_of(source.demonstrations, content.first_ns)
         covered = said == "said meanwhile" and labels_of(content)
-        write_labels(beside, stretches, content.first_ns, found=True)
+        write_labels(content, stretches, found=True)
         yield f"{_several(len(stretches), 'label')} written to {beside}" + (
             ": they count instead of those said meanwhile, until you remove it" if covered else ""
         )

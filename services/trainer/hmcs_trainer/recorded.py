@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hmcs.bus.messages import Motion
-from hmcs.recordings.inspection import losses_of
+from hmcs.recordings.inspection import damages, losses_of, unread
+from hmcs.recordings.labels import label_notes
 from hmcs.recordings.reading import RecordingContent
 from hmcs.task import Task
 from hmcs_trainer.validation import Finding
@@ -37,5 +38,5 @@ def recording_findings(task: Task, content: RecordingContent) -> Iterator[Findin
             f"first {first.messages} of them before {first.at_s:.2f} s: the way is straight there; "
             "leave it out, if that was not meant",
         )
-    if not content.whole:
-        yield Finding(False, f"{name}: it was cut off: what came in its last moments is missing")
+    for told in (*damages(content), *unread(content, Motion), *label_notes(content)):
+        yield Finding(False, f"{name}: {told}")

@@ -2,8 +2,9 @@
 
 Exits with 0 where it answers that it is healthy, with 1 and one line why otherwise, with 2 for a
 mistake in the question. Router, cell and instance are taken from HMCS_ROUTER, HMCS_CELL and
-HMCS_INSTANCE unless given; without an instance every one of the service must be healthy. The
-service `router` is the router itself: it is healthy when a session with it opens.
+HMCS_INSTANCE unless given; without an instance every one of the service that is present must
+answer and be healthy. The service `router` is the router itself: it is healthy when a session with
+it opens.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from operator import itemgetter
 
 from pydantic import ValidationError
 
 from hmcs.bus.config import DEFAULT_ROUTER
-from hmcs.bus.keys import ANY, KeyNameError
+from hmcs.bus.keys import ANY, KeyNameError, Member
 from hmcs.bus.messages import Ask, Health
+from hmcs.bus.presence import present
 from hmcs.bus.session import Bus, BusSettings, BusUnavailableError, RequestRefusedError
+from hmcs.shown import plain
 
 ROUTER = "router"
 
@@ -49,18 +53,31 @@ def _problem(arguments: argparse.Namespace) -> str | None:
         with Bus.open(settings, "health", f"pid-{os.getpid()}", log=quiet) as bus:
             if arguments.service == ROUTER:
                 return None
-            key = bus.keys.rpc(arguments.service, arguments.instance, "health")
+            keys = bus.keys
+            key = keys.rpc(arguments.service, arguments.instance, "health")
+            tokens = bus.alive(keys.presence(arguments.service, arguments.instance))
             answers = bus.ask(key, Ask(), Health, arguments.timeout)
     except BusUnavailableError as error:
         return str(error)
     except RequestRefusedError as error:
         return f"could not say how it is: {error}"
-    if not answers:
-        return f"nobody answered on {key} within {arguments.timeout:g} s (router {settings.router})"
-    return next(
-        (f"{a.envelope.source.instance}: {a.body.detail}" for a in answers if not a.body.healthy),
-        None,
-    )
+    within = f"within {arguments.timeout:g} s (router {settings.router})"
+    told = {Member(a.envelope.source.service, a.envelope.source.instance): a.body for a in answers}
+    problems = [
+        *(
+            f"{member.instance}: is present, but did not answer {within}"
+            for member in present(keys, tokens).members
+            if member not in told
+        ),
+        *(
+            f"{plain(member.instance)}: {plain(health.detail)}"
+            for member, health in sorted(told.items(), key=itemgetter(0))
+            if not health.healthy
+        ),
+    ]
+    if not told and not problems:
+        return f"nobody answered on {key} {within}"
+    return "; ".join(problems) or None
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,16 +1,26 @@
 """Structured logs: one line an event, for people on a terminal, as JSON for everything else.
 
-Facts about an event go in `extra`: `log.info("router lost", extra={"endpoint": endpoint})`.
+Facts about an event go in `extra`: `log.info("router lost", extra={"endpoint": endpoint})`. They
+may come from other processes: no control character of theirs stands in a line.
 """
 
 from __future__ import annotations
 
 import json
 import logging
+import re
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, TextIO
 
+from hmcs.shown import plain
+
+MOST_KINDS = 32
+"""Kinds of events that one log follows; there are more only where what is logged makes them up."""
+_LONGEST_KIND, _LONGEST_FACT = 200, 2000
+"""Characters."""
+_US_PER_S = 1_000_000
 _STANDARD = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
 
 
@@ -27,16 +37,17 @@ class JsonLines(logging.Formatter):
             "time": _utc(record.created),
             "level": record.levelname.lower(),
             "process": self._process,
-            "event": record.getMessage(),
-            **_facts(record),
+            "event": _cut(record.getMessage()),
+            **{name: _cut(value) for name, value in _facts(record).items()},
         }
         if record.exc_info:
             event["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(event, default=str, ensure_ascii=False)
+        line = json.dumps(event, default=str, ensure_ascii=False)
+        return line if line.isprintable() else "".join(map(_in_json, line))
 
 
 class Readable(logging.Formatter):
-    """One line for people; a traceback follows where there is one."""
+    """One line for people; a traceback follows, indented, where there is one."""
 
     def __init__(self, process: str) -> None:
         super().__init__()
@@ -45,16 +56,29 @@ class Readable(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         """Return the line of one event."""
         clock = time.strftime("%H:%M:%S", time.localtime(record.created))
-        facts = "".join(f"  {name}={value}" for name, value in _facts(record).items())
-        line = (
-            f"{clock}.{int(record.msecs):03d} {record.levelname.lower():7} "
-            f"{self._process}  {record.getMessage()}{facts}"
+        facts = "".join(
+            f"  {plain(name)}={plain(str(value), _LONGEST_FACT)}"
+            for name, value in _facts(record).items()
         )
-        return line + ("\n" + self.formatException(record.exc_info) if record.exc_info else "")
+        event = plain(record.getMessage(), _LONGEST_FACT)
+        told = [
+            f"{clock}.{int(record.msecs):03d} {record.levelname.lower():7} "
+            f"{self._process}  {event}{facts}"
+        ]
+        if record.exc_info:
+            told += [
+                f"  {_indent(line)}{plain(line.strip(), _LONGEST_FACT)}"
+                for line in self.formatException(record.exc_info).split("\n")
+            ]
+        return "\n".join(told)
 
 
 class Seldom:
-    """Logs an event of one kind at once, then at most once a period, with how many it left out."""
+    """Logs an event of one kind at once, then at most once a period, with how many it left out.
+
+    What follows a colon and a blank tells of one event and is no kind: `BadStepError: step 7 …` is
+    one with `BadStepError: step 8 …`. Nor are numbers, except in keys of the bus.
+    """
 
     def __init__(
         self,
@@ -65,19 +89,44 @@ class Seldom:
         self._log = log
         self._period_s = period_s
         self._clock = clock
-        self._last_s: dict[str, float] = {}
+        self._last_s: OrderedDict[str, float] = OrderedDict()
+        """When each kind was logged last, the one that was logged longest ago first."""
         self._left_out: dict[str, int] = {}
+        """Events of a kind that were left out since then."""
+        self._others_left_out = 0
+        """Events of kinds that are not followed."""
 
     def warning(self, kind: str, event: str, *, exc_info: bool = False, **facts: object) -> None:
-        """Log `event` unless one of its kind was logged less than a period ago."""
-        now_s = self._clock()
+        """Log `event` unless one of its kind was logged less than a period ago.
+
+        Of more than `MOST_KINDS` kinds the oldest is forgotten; where even that was logged less
+        than a period ago the event is left out. A later event says how many of such were left out.
+        """
+        now_s, kind = self._clock(), _kind_in(kind)
         if now_s - self._last_s.get(kind, -float("inf")) < self._period_s:
             self._left_out[kind] = self._left_out.get(kind, 0) + 1
             return
+        if kind not in self._last_s and not self._has_place(now_s):
+            self._others_left_out += 1
+            return
         self._last_s[kind] = now_s
+        self._last_s.move_to_end(kind)
         if left_out := self._left_out.pop(kind, 0):
             facts["left_out"] = left_out
+        if self._others_left_out:
+            facts["others_left_out"], self._others_left_out = self._others_left_out, 0
         self._log.warning(event, extra=facts, exc_info=exc_info)
+
+    def _has_place(self, now_s: float) -> bool:
+        """Whether a new kind can be followed; the oldest gives way where it may."""
+        if len(self._last_s) < MOST_KINDS:
+            return True
+        oldest = next(iter(self._last_s))
+        if now_s - self._last_s[oldest] < self._period_s:
+            return False
+        del self._last_s[oldest]
+        self._others_left_out += self._left_out.pop(oldest, 0)
+        return True
 
 
 def open_log(process: str, level: str, stream: TextIO) -> logging.Logger:
@@ -95,7 +144,27 @@ def _facts(record: logging.LogRecord) -> dict[str, Any]:
     return {name: value for name, value in vars(record).items() if name not in _STANDARD}
 
 
-def _utc(seconds: float) -> str:
+def _kind_in(told: str) -> str:
+    kind = told[:_LONGEST_KIND].partition(": ")[0]
+    return kind if "/" in kind else re.sub(r"\d+", "#", kind)
+
+
+def _cut(value: Any) -> Any:
     return (
-        time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(seconds)) + f".{seconds % 1:.6f}"[2:] + "Z"
+        value[:_LONGEST_FACT] + "…"
+        if isinstance(value, str) and len(value) > _LONGEST_FACT
+        else value
     )
+
+
+def _in_json(character: str) -> str:
+    return character if character.isprintable() else json.dumps(character)[1:-1]
+
+
+def _indent(line: str) -> str:
+    return " " * (len(line) - len(line.lstrip(" ")))
+
+
+def _utc(seconds: float) -> str:
+    whole_s, us = divmod(round(seconds * _US_PER_S), _US_PER_S)
+    return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(whole_s)) + f".{us:06d}Z"

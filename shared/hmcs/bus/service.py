@@ -35,14 +35,20 @@ from hmcs.bus.settings import ServiceSettings, as_yaml, load_settings
 from hmcs.bus.verbs import DESCRIBE, HEALTH, SETTINGS
 from hmcs.errors import UserError
 
-__all__ = ["Service", "ServiceSettings", "UserError", "run", "serve"]
+__all__ = ["CannotGoOnError", "Service", "ServiceSettings", "UserError", "run", "serve"]
 
 UNHEALTHY_FOR_S = 10.0
 """How long a failed handler makes a process unhealthy."""
 FAILURE_LETTERS = 500
 """How much of a failure health tells: an error may quote whatever somebody sent."""
+SWITCH_S = 0.0005
+"""How long a thread may keep the interpreter from the others."""
 _PUMP_S = 0.5
 _RATE_WINDOW_S = 1.0
+
+
+class CannotGoOnError(Exception):
+    """A process has lost what it cannot do without: it ends with code 1, to be started anew."""
 
 
 class Service:
@@ -87,6 +93,8 @@ def run(service_type: type[Service], argv: Sequence[str] | None = None) -> int:
         # What libraries have loaded stays. Looking through all of it for garbage holds up every
         # thread at once, up to 0.2 s on a busy machine: a robot would stop for it.
         gc.freeze()
+        # What runs beside the loop gives way to it soon: the usual 5 ms at every turn add up.
+        sys.setswitchinterval(SWITCH_S)
         with _stop_on_signals() as stop:
             return _run(service_type, settings, log, stop)
     except (UserError, KeyNameError) as error:
@@ -193,7 +201,7 @@ class _Life:
         """Handle what is pending; outlive a handler that fails."""
         try:
             self._bus.pump(_PUMP_S)
-        except StoppedError:
+        except (StoppedError, CannotGoOnError):
             raise
         except Exception as error:
             self._failures += 1

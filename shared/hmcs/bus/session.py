@@ -409,6 +409,10 @@ class Bus:
         """Call `handler` once, when the local monotonic clock reaches `monotonic_ns`."""
         return self._timers.add(monotonic_ns, Timer(handler, None))
 
+    def soon(self, work: Callable[[], None]) -> None:
+        """Do `work` in the thread that pumps, in its turn; from any thread."""
+        self._mailbox.put(work)
+
     def pump(self, timeout_s: float) -> int:
         """Handle what is pending, in order of arrival, and timers when they are due.
 

@@ -6,14 +6,14 @@ import argparse
 import secrets
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, NoReturn, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, NoReturn, Self, TypeVar
 
 import pydantic_settings
 import yaml
-from pydantic import BeforeValidator, Field, ValidationError, field_validator
+from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, CliSettingsSource, EnvSettingsSource, SettingsConfigDict
 
-from hmcs.bus.config import DEFAULT_ROUTER, BusSettings, check_endpoint
+from hmcs.bus.config import DEFAULT_ROUTER, BusSettings, check_endpoint, check_tls
 from hmcs.bus.keys import check_name
 from hmcs.errors import UserError
 
@@ -50,6 +50,17 @@ class ServiceSettings(BaseSettings):
     """Which one of its kind this process is; a short random name by default."""
     direct: bool = False
     """Talk to other direct processes without the router's hop, once it has introduced them."""
+    open_to_network: bool = False
+    """Let a direct process be reached from other hosts, too. There is no encryption and no
+    password: everybody who reaches its port can move the robot."""
+    tls_ca: Annotated[Path | None, EMPTY_IS_NONE] = None
+    """Certificate of the closed cell's authority (PEM); with `tls_certificate` and `tls_key`."""
+    tls_certificate: Annotated[Path | None, EMPTY_IS_NONE] = None
+    """This process' own certificate (PEM)."""
+    tls_key: Annotated[Path | None, EMPTY_IS_NONE] = None
+    """The private key of that certificate (PEM)."""
+    model_key: Annotated[Path | None, EMPTY_IS_NONE] = None
+    """Public key (PEM) that model files have to be signed for; none by default."""
     connect_timeout_s: float | None = Field(default=None, gt=0)
     """How long to wait for a router; for ever by default."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
@@ -59,6 +70,11 @@ class ServiceSettings(BaseSettings):
     @classmethod
     def _router_is_an_endpoint(cls, router: str) -> str:
         return check_endpoint(router)
+
+    @model_validator(mode="after")
+    def _tls_is_whole(self) -> Self:
+        check_tls(self)
+        return self
 
     @field_validator("cell", "instance")
     @classmethod
@@ -72,6 +88,10 @@ class ServiceSettings(BaseSettings):
             router=self.router,
             cell=self.cell,
             direct=self.direct,
+            open_to_network=self.open_to_network,
+            tls_ca=self.tls_ca,
+            tls_certificate=self.tls_certificate,
+            tls_key=self.tls_key,
             connect_timeout_s=self.connect_timeout_s,
         )
 

@@ -75,8 +75,19 @@ class StepFeed:
 
     def begin(self) -> None:
         """Listen, and hand on the last steps there are; returns when caught up."""
+        self.listen()
+        self.catch_up()
+
+    def listen(self) -> None:
+        """Listen from now on; steps made since the last one handed on are fetched with the next."""
         self._bus.subscribe(Step, self._bus.keys.step, self._on_live)
         self._bus.subscribe(Pairing, self._bus.keys.pairing, self._on_pairing)
+
+    def catch_up(self) -> None:
+        """Hand on the last steps there are.
+
+        On the loop's thread, or on another one before this feed listens.
+        """
         self._catch_up(self._fetch(self._memory_steps, before=None, clock=None))
 
     def _on_pairing(self, received: Received[Pairing]) -> None:

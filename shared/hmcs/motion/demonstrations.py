@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from hmcs.errors import UserError
 from hmcs.motion.quaternions import is_unit
+from hmcs.plain_numbers import number_in, separator_in
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -30,6 +31,10 @@ _TIME, _AXES, _STATE = "time_s", ("x_m", "y_m", "z_m"), "state"
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _WRENCH = ("fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm")
 _HEADER = f"time_s,x_m,y_m[,z_m][,{','.join(_QUATERNION)}][,{','.join(_WRENCH)}][,state]"
+
+
+LARGEST_BYTES = 512 * 1024 * 1024
+"""Of a file: an hour at 1 kHz with every column. What is read of it takes several times as much."""
 
 
 class DemonstrationError(UserError):
@@ -153,12 +158,19 @@ class _Row(NamedTuple):
 
 def _text(file: Path) -> str:
     try:
-        data = file.read_bytes()
+        if file.exists() and not file.is_file():
+            raise DemonstrationError(f"{file}: cannot be read: it is no file, expected a CSV file")
+        with file.open("rb") as stream:
+            data = stream.read(LARGEST_BYTES + 1)
     except OSError as error:
         raise DemonstrationError(
             f"{file}: cannot be read: {error.strerror}; give the path of a CSV file with the "
             f"header {_HEADER}"
         ) from error
+    if len(data) > LARGEST_BYTES:
+        raise DemonstrationError(
+            f"{file}: has more than {LARGEST_BYTES / 1e6:.0f} MB, more than a demonstration has"
+        )
     if not data.strip():
         raise DemonstrationError(f"{file}:1: empty, expected the header {_HEADER}")
     try:
@@ -187,6 +199,8 @@ def _columns(file: Path, header: list[str]) -> list[str]:
     lacking = [name for sense in senses for name in sense if name not in columns]
     if columns[:1] != [_TIME] and _is_numbers(columns):
         what = "the header is missing"
+    elif (mark := separator_in(",".join(header))) is not None:
+        what = f"the columns are separated by {mark}, separate them by commas"
     elif strangers:
         what = f"unknown column {', '.join(repr(column) for column in strangers)}"
     elif not set(_AXES[:2]) <= set(positions):
@@ -229,16 +243,13 @@ def _rows(file: Path, reader: Reader, columns: list[str]) -> Iterator[_Row]:
 
 def _number(where: str, name: str, text: str) -> float:
     try:
-        number = float(text)
-    except ValueError:
-        raise DemonstrationError(f"{where}: {name} is {text[:32]!r}, expected a number") from None
-    if not math.isfinite(number):
-        raise DemonstrationError(f"{where}: {name} is {text.strip()}, expected a finite number")
-    return number
+        return number_in(text)
+    except ValueError as error:
+        raise DemonstrationError(f"{where}: {name} is {error}") from None
 
 
 def _is_numbers(fields: list[str]) -> bool:
     try:
-        return bool([float(text) for text in fields])
+        return bool([number_in(text) for text in fields])
     except ValueError:
         return False

@@ -42,6 +42,26 @@ def taken_apart(knowledge: object) -> Content:
     return Content(_plain(knowledge, "", arrays), arrays)
 
 
+def array_names(plain: Any) -> tuple[str, ...]:
+    """Return the names of the arrays that plain content refers to, each once.
+
+    Raises ContentError for a name that is none.
+    """
+    found: dict[str, None] = {}
+    waiting = [plain]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict) and set(value) == {_ARRAY}:
+            if not isinstance(value[_ARRAY], str):
+                raise ContentError(f"array {value[_ARRAY]!r:.80}: expected its name")
+            found[value[_ARRAY]] = None
+        elif isinstance(value, dict):
+            waiting += value.values()
+        elif isinstance(value, list):
+            waiting += value
+    return tuple(found)
+
+
 def put_together(kind: type[Knowledge], content: Content) -> Knowledge:
     """Return the knowledge of that kind.
 
@@ -50,7 +70,7 @@ def put_together(kind: type[Knowledge], content: Content) -> Knowledge:
     """
     for name, array in content.arrays.items():
         if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
-            raise ContentError(f"array {name!r} holds numbers that are not finite")
+            raise ContentError(f"array {name!r:.80} holds numbers that are not finite")
     adapter = TypeAdapter(
         kind, config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
     )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recognition.exits import DEFAULT_WEIGHTS
-from hmcs.recognition.gestemes import GestemeParameters
+from hmcs.recognition.gestemes import LONGEST_WINDOW_STEPS, GestemeParameters
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.learning import EMISSION, baum_welch
 from hmcs.recognition.hmm.model import Hmm
@@ -67,8 +67,8 @@ class LearningSettings(NamedTuple):
     prune_nats: float = 30.0
     window_factor: float = 2.0
     """The window is so many times the longest gesteme of the demonstrations..."""
-    window_limit_steps: int = 300
-    """...but at most this."""
+    window_limit_steps: int = LONGEST_WINDOW_STEPS
+    """...but at most this. Starts long ago cost little: hardly any of them lives on."""
     alarm_window_steps: int = 20
     unknown_rise: float = 0.9
     """The background is raised by so much of the alarm's threshold: then unknown motion is not

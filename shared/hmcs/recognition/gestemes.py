@@ -26,6 +26,11 @@ from hmcs.recognition.sensors import SensorReader
 Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
+LONGEST_WINDOW_STEPS = 1_999
+"""No window of a model is longer. Who joins replays one step more than the window, and an input
+device remembers 2,000 steps at least; the fixture lays its guide at a start up to 2,048 steps ago.
+"""
+
 
 class GestemeParameters(NamedTuple):
     """The left-right Gaussian HMMs of all gestemes of a model.
@@ -220,6 +225,19 @@ class GestemeBank:
             both = alignment.joined(alignment.picked(self._similarity, mine), fresh._similarity)
             bank._similarity = alignment.picked(both, order)
         return bank
+
+    def keep_only(self, start: int) -> None:
+        """Forget all pairs but those that began at step `start`."""
+        kept = self._start == start
+        self._gesteme, self._start, self._origin = (
+            self._gesteme[kept],
+            self._start[kept],
+            self._origin[kept],
+        )
+        self._running, self._phase = self._running[kept], self._phase[kept]
+        self._leaving, self._exit_features = self._leaving[kept], self._exit_features[kept]
+        if self._aligned is not None:
+            self._similarity = alignment.picked(self._similarity, kept)
 
     def _log_emissions(self, gesteme: Integers, where: Array, direction: Array) -> Array:
         """Return the log density of what each pair observed in each phase, shape (p, N).

@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
 from hmcs.recognition.alignment import Alignment
-from hmcs.recognition.exits import DEFAULT_WEIGHTS, fit_exit
+from hmcs.recognition.exits import fit_exit
 from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
-from hmcs.recognition.gestemes import GestemeBank, GestemeParameters, Scoring
+from hmcs.recognition.gestemes import (
+    LONGEST_WINDOW_STEPS,
+    GestemeBank,
+    GestemeParameters,
+    Scoring,
+)
 from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import axes_of
 from hmcs.recognition.segment_filter import SegmentFilter
-from hmcs.recognition.segments import Segment
+from hmcs.recognition.segments import LearningError, Segment
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import fit_of, learn_alarm
 from hmcs.task import Task
@@ -37,8 +42,7 @@ def learn_layers(
     by_gesteme = [[s for s in segments if s.gesteme == g] for g in range(len(task.gestemes))]
     axes = axes_of(task)
     parameters = fit_gestemes(by_gesteme, axes, settings)
-    longest = max(len(segment.steps) for segment in segments)
-    window = int(min(settings.window_limit_steps, np.ceil(settings.window_factor * longest)))
+    window = _window(segments, settings, progress)
     aligned = Alignment(settings.alignment_sigma, settings.temperature)
     scoring = Scoring(0.0, settings.temperature, window, settings.prune_nats, aligned)
     progress("background level and alarm threshold from demonstrations left out")
@@ -63,39 +67,23 @@ def learn_layers(
     return Layers(parameters, scoring, settings.filter, alarm)
 
 
-def check_layers(layers: Layers, task: Task) -> None:
-    """Raise ValueError where the arrays do not fit together, or not the task."""
-    p = layers.parameters
-    shape, dimensions = p.initial.shape, len(axes_of(task))
-    variants = p.ends.shape[:2]
-    expected = {
-        "means": (*shape, 2 * dimensions),
-        "variances": (*shape, 2 * dimensions),
-        "ends": (*variants, dimensions),
-        "normals": (*variants, dimensions),
-        "exit_weights": DEFAULT_WEIGHTS.shape,
-    }
-    for field, value in p._asdict().items():
-        if field in ("step_m", "senses"):
-            continue
-        kind = np.int32 if field == "variant" else np.float64
-        wanted = expected.get(field, shape)
-        if value.shape != wanted or value.dtype != kind:
-            raise ValueError(
-                f"array {field!r} is {value.dtype} of shape {value.shape}, "
-                f"expected {np.dtype(kind)} of shape {wanted}"
-            )
-    if shape[:1] != (len(task.gestemes),) or not (p.variances > 0).all():
-        raise ValueError(
-            f"its arrays are for {shape[0]} gestemes with positive variances, "
-            f"its task has {len(task.gestemes)}"
+def _window(
+    segments: Sequence[Segment], settings: LearningSettings, progress: Callable[[str], None]
+) -> int:
+    """How many steps back a start is remembered."""
+    if not 1 <= settings.window_limit_steps <= LONGEST_WINDOW_STEPS:
+        raise LearningError(
+            f"window_limit_steps is {settings.window_limit_steps}, expected 1 to "
+            f"{LONGEST_WINDOW_STEPS}: what lies farther back no process remembers"
         )
-    senses = p.senses
-    wanted = (*shape, len(senses.weights))
-    if senses.means.shape != wanted or senses.variances.shape != wanted:
-        raise ValueError(f"what its senses expect is not of shape {wanted}")
-    if not p.step_m > 0 or variants[0] != shape[0] or (p.variant >= variants[1]).any():
-        raise ValueError("its variants or its step length are none")
+    longest = max(segments, key=lambda segment: len(segment.steps))
+    steps = len(longest.steps)
+    if steps >= settings.window_limit_steps and settings.window_limit_steps < LONGEST_WINDOW_STEPS:
+        progress(
+            f"{longest.demonstration} shows a gesteme of {steps} steps, but window_limit_steps is "
+            f"{settings.window_limit_steps}: it is not recognized to its end; raise that setting"
+        )
+    return int(min(settings.window_limit_steps, np.ceil(settings.window_factor * steps)))
 
 
 class _HeldOut(NamedTuple):
@@ -125,8 +113,8 @@ def _held_out(
 
 
 def _by_demonstration(segments: Sequence[Segment]) -> list[list[Segment]]:
-    names = dict.fromkeys(segment.demonstration for segment in segments)
-    return [[s for s in segments if s.demonstration == name] for name in names]
+    shown = dict.fromkeys(segment.demonstration_index for segment in segments)
+    return [[s for s in segments if s.demonstration_index == index] for index in shown]
 
 
 class _Track(NamedTuple):
@@ -141,13 +129,18 @@ class _Track(NamedTuple):
 def _track(
     parameters: GestemeParameters, scoring: Scoring, axes: Sequence[int], segment: Segment
 ) -> _Track:
-    # Nothing is pruned: the log-likelihood of the true hypothesis is wanted whatever it is.
-    lenient = scoring._replace(prune_nats=np.inf, temperature=1.0, background=0.0)
+    # Nothing is pruned or dropped: the log-likelihood of the true hypothesis is wanted whatever it
+    # is, and however long the segment.
+    lenient = scoring._replace(
+        prune_nats=np.inf, temperature=1.0, background=0.0, window_steps=len(segment.steps) + 1
+    )
     bank = GestemeBank(parameters, lenient, axes, [segment.gesteme])
     scores, exits = [], []
     for k, step in enumerate(segment.steps):
         scores.append(float(bank.step(step._replace(index=k)).log_ratio[0]))
         exits.append(bank.exit_features[0])
+        # Its start is known: no other one is of interest.
+        bank.keep_only(0)
     return _Track(np.array(scores), np.array(exits))
 
 

@@ -10,22 +10,34 @@ import hashlib
 import io
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
-from hmcs.recognition.content import AnyArray, Content, ContentError, put_together, taken_apart
+from hmcs.recognition.checking import LARGEST, check_shapes, check_within
+from hmcs.recognition.content import (
+    AnyArray,
+    Content,
+    array_names,
+    put_together,
+    taken_apart,
+)
 from hmcs.recognition.model import Model
+from hmcs.recognition.model_archive import ARRAYS, MANIFEST, MOST_BYTES, Archive, ArchiveError
 from hmcs.recognition.recognizers import kind_named
 from hmcs.task import Task
+from hmcs.task.values import Name
 from hmcs.whole_files import written_whole
 
 FORMAT = "hmcs-model/1"
+MOST_POINTS = 10_000
+"""Of a guide's path."""
 
-_MANIFEST, _ARRAYS = "model.json", "arrays/"
 _PATH, _SPREAD, _TURN = "guide.path.", "guide.spread.", "guide.turn."
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -41,8 +53,8 @@ class Manifest(BaseModel):
 
     format: str
     recognizer: str
-    name: str
-    hash: str
+    name: Name
+    hash: Annotated[str, Field(max_length=64)]
     task: Task
     knowledge: Any
     """Of the recognizer; where an array stands there is `{"$array": its name}`."""
@@ -65,11 +77,11 @@ def save_model(model: Model, path: str | Path) -> Model:
     ):
         manifest, arrays = _parts(model)
         text = json.dumps(manifest, indent=2, sort_keys=True)
-        archive.writestr(zipfile.ZipInfo(_MANIFEST, _EPOCH), text)
+        archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), text)
         for name, array in arrays.items():
             buffer = io.BytesIO()
             np.save(buffer, array, allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{_ARRAYS}{name}.npy", _EPOCH), buffer.getvalue())
+            archive.writestr(zipfile.ZipInfo(f"{ARRAYS}{name}.npy", _EPOCH), buffer.getvalue())
     return model
 
 
@@ -88,86 +100,112 @@ def model_files(place: Path) -> list[Path]:
     return files
 
 
-def load_model(path: str | Path) -> Model:
-    """Read a model file.
+def load_model(path: str | Path, *, verify: Callable[[Path, bytes], None] | None = None) -> Model:
+    """Read a model file; see `model_archive` for the bounds of what is read.
 
-    Raises ModelFileError when there is no such file, it is truncated or no model file, of another
-    format version, damaged (checksum), or holds numbers that are not finite or do not fit.
+    `verify` is called with the very bytes before they are decoded, and may refuse them.
+
+    Raises ModelFileError when there is no such file, it is truncated or no model file, too large,
+    of another format version, damaged (checksum), or holds numbers that are not finite, do not fit,
+    or are none that its recognizer can compute with.
     """
     source = Path(path)
-    if not source.is_file():
-        raise ModelFileError(f"{source}: no such model file: make one with `hmcs train`")
     try:
-        with zipfile.ZipFile(source) as archive:
-            fields = json.loads(archive.read(_MANIFEST))
-            arrays = {
-                name.removeprefix(_ARRAYS).removesuffix(".npy"): np.load(
-                    io.BytesIO(archive.read(name)), allow_pickle=False
-                )
-                for name in archive.namelist()
-                if name.startswith(_ARRAYS)
-            }
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
+        content = read_bounded(source, MOST_BYTES)
+    except UnreadableFileError as error:
+        what = error.what.replace("no such file", "no such model file")
+        raise ModelFileError(f"{source}: {what}: make one with `hmcs train`") from error
+    if verify is not None:
+        verify(source, content)
+    try:
+        with Archive(content) as archive:
+            fields = archive.manifest()
+            manifest = _manifest(source, fields)
+            return _model(source, manifest, archive)
+    except ArchiveError as error:
         raise ModelFileError(
             f"{source}: no model file, or a truncated one ({error}): train it again"
         ) from error
-    return _model(source, fields, arrays)
 
 
-def _model(source: Path, fields: Any, arrays: dict[str, AnyArray]) -> Model:
+def check_model(model: Model) -> None:
+    """Raise ValueError where `load_model` would not take a model's knowledge or guides."""
+    kind = kind_named(model.recognizer)
+    put_together(kind.knowledge, taken_apart(model.knowledge))
+    kind.check(model.knowledge, model.task)
+    _check_guides(model)
+
+
+def _manifest(source: Path, fields: Any) -> Manifest:
     version = fields.get("format") if isinstance(fields, dict) else None
     if version != FORMAT:
         raise ModelFileError(
-            f"{source}: format {version!r}, expected {FORMAT!r}: train the model again "
+            f"{source}: format {version!r:.40}, expected {FORMAT!r}: train the model again "
             "with this version of hmcs"
         )
     try:
-        manifest = Manifest.model_validate(fields)
+        return Manifest.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise ModelFileError(
+            f"{source}: not a complete model: {where}: {first['msg']:.300}"
+        ) from error
+
+
+def _model(source: Path, manifest: Manifest, archive: Archive) -> Model:
+    try:
         kind = kind_named(manifest.recognizer)
-        count = len(manifest.task.gestemes)
-        paths = tuple(arrays.pop(f"{_PATH}{k}") for k in range(count))
-        spreads = tuple(arrays.pop(f"{_SPREAD}{k}") for k in range(count))
-        turns = tuple(arrays.pop(f"{_TURN}{k}", None) for k in range(count))
-        knowledge: Any = put_together(kind.knowledge, Content(manifest.knowledge, arrays))
+        gestemes = range(len(manifest.task.gestemes))
+        guides = [f"{begin}{k}" for begin in (_PATH, _SPREAD) for k in gestemes]
+        own = array_names(manifest.knowledge)
+        arrays = archive.arrays([*guides, *own], [f"{_TURN}{k}" for k in gestemes])
+        knowledge: Any = put_together(
+            kind.knowledge, Content(manifest.knowledge, {name: arrays[name] for name in own})
+        )
         kind.check(knowledge, manifest.task)
-    except KeyError as error:
-        raise ModelFileError(f"{source}: not a complete model: {error} is missing") from error
-    except (ValidationError, ContentError, ValueError) as error:
+        turns = tuple(arrays.get(f"{_TURN}{k}") for k in gestemes)
+        model = Model(
+            name=manifest.name,
+            hash=manifest.hash,
+            task=manifest.task,
+            recognizer=manifest.recognizer,
+            knowledge=knowledge,
+            path_points=tuple(arrays[f"{_PATH}{k}"] for k in gestemes),
+            path_spreads=tuple(arrays[f"{_SPREAD}{k}"] for k in gestemes),
+            demonstrations=manifest.demonstrations,
+            path_turns=() if all(turn is None for turn in turns) else turns,
+        )
+        _check_guides(model)
+    except (ValueError, LookupError, TypeError) as error:
+        # LookupError, TypeError: of a kind from elsewhere, whose check takes shapes for granted.
         raise ModelFileError(f"{source}: not a complete model: {error}") from error
     except UserError as error:
         raise ModelFileError(f"{source}: {error}") from error
-    model = Model(
-        name=manifest.name,
-        hash=manifest.hash,
-        task=manifest.task,
-        recognizer=manifest.recognizer,
-        knowledge=knowledge,
-        path_points=paths,
-        path_spreads=spreads,
-        demonstrations=manifest.demonstrations,
-        path_turns=() if all(turn is None for turn in turns) else turns,
-    )
-    _check_guides(source, model)
     if _digest(model) != model.hash:
         raise ModelFileError(f"{source}: damaged, its checksum does not fit: train it again")
     return model
 
 
-def _check_guides(source: Path, model: Model) -> None:
+def _check_guides(model: Model) -> None:
+    """Raise ValueError for a guide that is no path, no spread beside it, or no turns along it."""
     for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
-        expected = {
-            f"{_PATH}{k}": (points, (len(points), 3)),
-            f"{_SPREAD}{k}": (spread, points.shape[:1]),
-        }
+        arrays = {f"{_PATH}{k}": points, f"{_SPREAD}{k}": spread}
+        shapes: dict[str, tuple[int, ...]] = {f"{_PATH}{k}": (len(points), 3)}
+        shapes[f"{_SPREAD}{k}"] = (len(points),)
         turns = model.path_turns[k] if model.path_turns else None
         if turns is not None:
-            expected[f"{_TURN}{k}"] = (turns, (len(turns), 4))
-        for name, (array, shape) in expected.items():
-            if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
-                raise ModelFileError(
-                    f"{source}: array {name!r} is {array.dtype} of shape {array.shape}, "
-                    f"expected finite float64 of shape {shape}"
-                )
+            arrays[f"{_TURN}{k}"] = turns
+            shapes[f"{_TURN}{k}"] = (len(turns), 4)
+        check_shapes(arrays, shapes)
+        check_within(f"points of {_PATH}{k}", len(points), 2, MOST_POINTS)
+        check_within(f"{_PATH}{k}", points, -LARGEST, LARGEST)
+        check_within(f"{_SPREAD}{k}", spread, 0.0, LARGEST)
+        if (points == points[0]).all():
+            raise ValueError(f"array '{_PATH}{k}' never moves, expected a path")
+        if turns is not None:
+            check_within(f"turns of {_TURN}{k}", len(turns), 2, MOST_POINTS)
+            check_within(f"length of {_TURN}{k}", np.linalg.norm(turns, axis=1), 0.999, 1.001)
 
 
 def _parts(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:

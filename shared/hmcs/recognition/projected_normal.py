@@ -32,10 +32,9 @@ _ERFCX = (
     1.00002368,
     -1.26551223,
 )
-_FARTHEST = 30.0
-"""|m| counts as no more: beyond, exp(m²/2) would overflow."""
-_OPPOSITE = -6.0
-"""Below it the recursion loses its digits; lengths there are those at it."""
+_RECURSION_FROM = -1.0
+"""Below it the recursion for j_k loses its digits; its continued fraction gains some there."""
+_FRACTION_TERMS = 60
 
 
 class Lengths(NamedTuple):
@@ -53,11 +52,14 @@ def log_density(directions: Array, means: Array, variances: Array) -> Array:
     `directions` and `means` have shape (n, D), `variances` (n,), above 0.
     """
     dimensions = directions.shape[1]
-    scaled = (directions * means).sum(axis=1) / np.sqrt(variances)
-    integral = _integrals(np.clip(scaled, -_FARTHEST, _FARTHEST), dimensions)[dimensions - 1]
+    along = (directions * means).sum(axis=1)
+    integral = _scaled_integrals(along / np.sqrt(variances), dimensions)[dimensions - 1]
+    # exp(m²/2), which the integrals lack for m > 0, takes away the share of v along d: what is left
+    # is small where it counts, and the difference of two large squares would not tell it.
+    aside = np.where((along > 0)[:, None], means - along[:, None] * directions, means)
     return np.asarray(
-        np.log(np.maximum(integral, 1e-300))
-        - 0.5 * (means**2).sum(axis=1) / variances
+        np.log(integral)
+        - 0.5 * (aside**2).sum(axis=1) / variances
         - 0.5 * dimensions * np.log(2.0 * np.pi)
     )
 
@@ -66,22 +68,40 @@ def lengths(directions: Array, means: Array, variances: Array) -> Lengths:
     """Return the moments of r given d; arguments as of `log_density`."""
     dimensions = directions.shape[1]
     scale = np.sqrt(variances)
-    scaled = (directions * means).sum(axis=1) / scale
-    j = _integrals(np.clip(scaled, _OPPOSITE, _FARTHEST), dimensions + 2)
+    j = _scaled_integrals((directions * means).sum(axis=1) / scale, dimensions + 2)
     of_direction = j[dimensions - 1]
     return Lengths(
-        scale * j[dimensions] / of_direction, variances * j[dimensions + 1] / of_direction
+        scale * (j[dimensions] / of_direction), variances * (j[dimensions + 1] / of_direction)
     )
 
 
-def _integrals(m: Array, count: int) -> list[Array]:
-    """Return j_0 to j_{count − 1} of m, each of shape (n,)."""
-    x = np.abs(m) / np.sqrt(2.0)
+def _scaled_integrals(m: Array, count: int) -> list[Array]:
+    """Return j_0 to j_{count − 1} of m, those of m > 0 times exp(−m²/2), each of shape (n,)."""
+    near = np.maximum(m, _RECURSION_FROM)
+    x = np.abs(near) / np.sqrt(2.0)
     t = 1.0 / (1.0 + 0.5 * x)
     below = np.sqrt(np.pi / 2.0) * t * np.exp(np.polyval(_ERFCX, t))
-    first = np.where(m < 0, below, np.sqrt(2.0 * np.pi) * np.exp(0.5 * m**2) - below)
-    values = [first, m * first + 1.0]
+    fall = np.where(near > 0, np.exp(-0.5 * np.square(np.minimum(near, 40.0))), 1.0)
+    first = np.where(near < 0, below, np.sqrt(2.0 * np.pi) - fall * below)
+    values = [first, near * first + fall]
     while len(values) < count:
         k = len(values) - 1
-        values.append(m * values[k] + k * values[k - 1])
+        values.append(near * values[k] + k * values[k - 1])
+    opposite = m < _RECURSION_FROM
+    if opposite.any():
+        for value, found in zip(values, _opposite_integrals(m[opposite], count), strict=False):
+            value[opposite] = found
     return values[:count]
+
+
+def _opposite_integrals(m: Array, count: int) -> list[Array]:
+    """Return j_0 to j_{count − 1} of m < 0: j_k / j_{k−1} = k / (−m + j_{k+1} / j_k)."""
+    ratio = 0.5 * (m + np.sqrt(m**2 + 4.0 * _FRACTION_TERMS))
+    ratios = list[Array]()
+    for k in range(_FRACTION_TERMS, 0, -1):
+        ratio = k / (ratio - m)
+        ratios.append(ratio)
+    values = [1.0 / (ratio - m)]
+    for k in range(1, count):
+        values.append(values[-1] * ratios[-k])
+    return values

@@ -6,6 +6,8 @@ here, so what runs over the bus is what runs in process.
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,6 +15,10 @@ import numpy as np
 from hmcs.motion.steps import Step
 from hmcs.recognition.gestemes import StepEvidence
 from hmcs.recognition.segment_filter import TaskBelief
+
+_log = logging.getLogger(__name__)
+_TOLERANCE = 1e-3
+"""How far the sum of probabilities may be from one."""
 
 
 class Recognition(NamedTuple):
@@ -40,17 +46,37 @@ class BadStepError(ValueError):
 
 
 class Guarded:
-    """Shows a recognizer only steps that are steps, in order and without gaps."""
+    """Shows a recognizer only steps that are steps, in order and without gaps.
 
-    def __init__(self, recognizer: Recognizer) -> None:
+    A recognizer that raises, or believes in what are no probabilities, may be left in any state:
+    with the next step another one begins.
+    """
+
+    def __init__(
+        self,
+        recognizer: Recognizer,
+        anew: Callable[[], Recognizer] | None = None,
+        tell: Callable[[str], None] = _log.warning,
+    ) -> None:
+        """Guard a recognizer; `anew` makes the one that takes its place after it raised.
+
+        It should be one that may begin in any state. Without it the same recognizer goes on.
+        `tell` is told that one begins anew, and why.
+        """
         self._recognizer = recognizer
+        self._anew = anew
+        self._tell = tell
         self._next: int | None = None
+        self._failure: str | None = None
+        self._told = False
 
     def step(self, step: Step) -> Recognition:
         """Take the next step.
 
         Raises BadStepError for a step out of order, or with a position, displacement or sense
-        that is not finite or of another shape.
+        that is not finite or of another shape: nothing changes by it. Raises what the recognizer
+        raises, or FloatingPointError for a belief that is none; the next step, whichever it is, is
+        then the first of one that begins anew.
         """
         if self._next is not None and step.index != self._next:
             raise BadStepError(f"step {step.index} came, expected {self._next}")
@@ -63,9 +89,36 @@ class Guarded:
                     f"step {step.index}: {field} is {value!r}, expected finite numbers of shape "
                     f"{shape}"
                 )
-        recognition = self._recognizer.step(step)
-        self._next = step.index + 1
+        if self._failure is not None:
+            self._begin_anew(step.index)
+        try:
+            recognition = self._recognizer.step(step)
+            _check(recognition)
+        except Exception as error:
+            self._next, self._failure = None, f"step {step.index}: {error!r}"
+            raise
+        self._next, self._told = step.index + 1, False
         return recognition
+
+    def _begin_anew(self, index: int) -> None:
+        if self._anew is not None:
+            self._recognizer = self._anew()
+        if not self._told:
+            self._tell(f"the recognizer failed ({self._failure}): it begins anew with step {index}")
+        # One that fails at every step is told of once.
+        self._failure, self._told = None, True
+
+
+def _check(recognition: Recognition) -> None:
+    """Raise FloatingPointError for a belief that nobody could act on."""
+    if isinstance(recognition, Recognition):
+        belief = recognition.belief
+        total = float(np.sum(belief.states)) + belief.unknown
+        if not (abs(total - 1.0) <= _TOLERANCE and np.isfinite(belief.log_likelihood)):
+            raise FloatingPointError(
+                f"the probabilities of all states sum to {total:g}, at a log-likelihood of "
+                f"{belief.log_likelihood:g}"
+            )
 
 
 _SHAPES = {"position": (3,), "displacement": (3,), "orientation": (4,), "wrench": (6,)}

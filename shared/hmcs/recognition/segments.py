@@ -26,6 +26,7 @@ class Segment(NamedTuple):
     """One performance of one gesteme."""
 
     demonstration: str
+    """Its name, to be told; two may have the same."""
     state: int
     """Index of the task state it was performed in."""
     gesteme: int
@@ -37,6 +38,8 @@ class Segment(NamedTuple):
     """Displacement of the step that followed it, m, shape (3,); None where none is known."""
     orientations: Array | None = None
     """Of the hand, x y z w, shape (T, 4); None where they were not recorded."""
+    demonstration_index: int = 0
+    """Of the demonstration among all that were cut: what tells one from another."""
 
     def motion(self, axes: Sequence[int]) -> Motion:
         """Return the motion along these axes, from its own origin."""
@@ -88,7 +91,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
     if not demonstrations:
         raise LearningError(f"no demonstrations of task {task.name!r}: give at least one")
     segments: list[Segment] = []
-    for demonstration in demonstrations:
+    for index, demonstration in enumerate(demonstrations):
         _check(demonstration)
         labeled, own, last = False, list[Segment](), -1
         for label, samples in demonstration.stretches:
@@ -116,6 +119,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
                     positions,
                     steps,
                     orientations=piece.orientations,
+                    demonstration_index=index,
                 )
             )
             last = samples.stop - 1

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.bus.messages import Belief
 from hmcs.recognition.scoring import changes
-from hmcs.recordings.guiding import Did, Guided
+from hmcs.recordings.guiding import Guided
 from hmcs.recordings.replaying import Replay
+from hmcs.recordings.ticks import Did
 
 COMPARED = ("probabilities", "unknown", "log_likelihood", "mean_log_likelihood", "segment_start")
 """What makes two beliefs the same, bit by bit."""
@@ -26,8 +27,11 @@ class Comparison(NamedTuple):
     """Two recognizers side by side."""
 
     steps: int
+    degraded: int
+    """Of those, believed without all evidence live: what was believed then was no fault of the
+    model, and is compared with nothing."""
     compared: int
-    """Steps both said something of, with all evidence."""
+    """The other steps both said something of."""
     same_bits: int
     """Of those, with the very same belief; only the same model can have them."""
     agreement: float
@@ -85,25 +89,33 @@ class FixtureComparison(NamedTuple):
 
 def compared(replay: Replay) -> Comparison:
     """Return how a replay stands to what was recorded, and both to the labels."""
-    pairs = [
-        (believed.replayed, believed.recorded)
-        for believed in replay.beliefs
-        if believed.recorded is not None and not believed.recorded.missing_gestemes
-    ]
-    alike = [now.likely_state == then.likely_state for now, then in pairs]
-    labeled = [believed for believed in replay.beliefs if believed.label is not None]
-    right = [believed.replayed.likely_state == believed.label for believed in labeled]
-    was_right = [
-        believed.recorded.likely_state == believed.label
-        for believed in labeled
-        if believed.recorded is not None
-    ]
+    now, then = array("q"), array("q")
+    """Likely states of the compared steps, by number."""
+    states: dict[str, int] = {}
+    degraded = same = 0
+    right: list[bool] = []
+    was_right: list[bool] = []
+    for believed in replay.beliefs:
+        replayed, recorded = believed.replayed, believed.recorded
+        if believed.label is not None:
+            right.append(replayed.likely_state == believed.label)
+            if recorded is not None:
+                was_right.append(recorded.likely_state == believed.label)
+        if recorded is None:
+            continue
+        if recorded.missing_gestemes:
+            degraded += 1
+            continue
+        same += same_bits(replayed, recorded)
+        for side, belief in ((now, replayed), (then, recorded)):
+            side.append(states.setdefault(belief.likely_state, len(states)))
     return Comparison(
         len(replay.beliefs),
-        len(pairs),
-        sum(same_bits(now, then) for now, then in pairs),
-        _mean(alike),
-        _later_steps(pairs),
+        degraded,
+        len(now),
+        same,
+        _mean([one == other for one, other in zip(now, then, strict=True)]),
+        _later_steps(now, then),
         _mean(right),
         _mean(was_right),
         replay.lasted_s / max(replay.spent_s, 1e-9),
@@ -119,43 +131,52 @@ def same_bits(one: Belief, other: Belief) -> bool:
 
 def fixtures_compared(guided: Guided) -> FixtureComparison:
     """Return how what the fixture would have done stands to what it did."""
-    ticks = [(tick.log_ns / 1e6, tick.now, tick.then) for tick in guided.ticks if tick.then]
-    times_ms = np.array([at_ms for at_ms, _, _ in ticks])
-    now, then = [now for _, now, _ in ticks], [then for _, _, then in ticks]
-    apart = [abs(a.factor - b.factor) for a, b in zip(now, then, strict=True)]
-    guides = [(a.guides, b.guides) for a, b in zip(now, then, strict=True)]
-    off_now_mm, off_then_mm = (
-        [1e3 * did.off_guide_m for did in side if did.off_guide_m is not None]
-        for side in (now, then)
-    )
-    holds_now, holds_then = (_events(side, guides=True) for side in (now, then))
-    goes_now, goes_then = (_events(side, guides=False) for side in (now, then))
-    lasted_s = (guided.ticks[-1].log_ns - guided.ticks[0].log_ns) / 1e9 if guided.ticks else 0.0
+    times_ms, apart, moved_apart = array("d"), array("d"), array("d")
+    degrees_apart, off_now_mm, off_then_mm = array("d"), array("d"), array("d")
+    same_states, both, then_only, now_only = 0, 0, 0, 0
+    events = _Events(), _Events()
+    for tick in guided.ticks:
+        now, then = tick.now, tick.then
+        if then is None:
+            continue
+        times_ms.append(tick.log_ns / 1e6)
+        apart.append(abs(now.factor - then.factor))
+        moved_apart.append(float(np.sum(np.square(now.velocity - then.velocity))))
+        same_states += now.state == then.state
+        both += now.guides and then.guides
+        then_only += then.guides and not now.guides
+        now_only += now.guides and not then.guides
+        if now.direction.any() and then.direction.any():
+            degrees_apart.append(_angle_deg(now.direction, then.direction))
+        for did, off_mm in ((now, off_now_mm), (then, off_then_mm)):
+            if did.off_guide_m is not None:
+                off_mm.append(1e3 * did.off_guide_m)
+        for side, did in zip(events, (now, then), strict=True):
+            side.take(times_ms[-1], did)
+    count = len(apart)
+    holds_now, holds_then = (side.takes_hold_ms for side in events)
+    goes_now, goes_then = (side.lets_go_ms for side in events)
+    ticks = guided.ticks
+    lasted_s = (ticks[-1].log_ns - ticks[0].log_ns) / 1e9 if ticks else 0.0
     return FixtureComparison(
-        len(guided.ticks),
         len(ticks),
+        count,
         _mean(apart),
         _mean([each <= CLOSE for each in apart]),
-        _mean([a.state == b.state for a, b in zip(now, then, strict=True)]),
-        _mean([both == (True, True) for both in guides]),
-        _mean([both == (False, True) for both in guides]),
-        _mean([both == (True, False) for both in guides]),
-        _mean(
-            [
-                _angle_deg(a.direction, b.direction)
-                for a, b in zip(now, then, strict=True)
-                if a.direction.any() and b.direction.any()
-            ]
-        ),
-        1e3 * _rms([a.velocity - b.velocity for a, b in zip(now, then, strict=True)]),
+        _share(same_states, count),
+        _share(both, count),
+        _share(then_only, count),
+        _share(now_only, count),
+        _mean(degrees_apart),
+        1e3 * float(np.sqrt(_mean(moved_apart))),
         _mean(off_then_mm),
         _mean(off_now_mm),
         len(holds_then),
         len(holds_now),
-        _later_ms(times_ms[holds_now], times_ms[holds_then]),
+        _later_ms(holds_now, holds_then),
         len(goes_then),
         len(goes_now),
-        _later_ms(times_ms[goes_now], times_ms[goes_then]),
+        _later_ms(goes_now, goes_then),
         lasted_s / max(guided.spent_s, 1e-9),
     )
 
@@ -166,10 +187,11 @@ def rows_of(replay: Replay, guided: Guided) -> Iterator[dict[str, object]]:
     Factor and compliance are those of the tick at the sample that completed the step.
     """
     first_ns = replay.beliefs[0].log_ns if replay.beliefs else 0
-    ticks = {(tick.device, tick.sample): tick for tick in guided.ticks}
+    ticks = {(tick.device, tick.sample): number for number, tick in enumerate(guided.ticks)}
     for believed in replay.beliefs:
         then = believed.recorded
-        tick = None if believed.sample is None else ticks.get((believed.clock, believed.sample))
+        number = None if believed.sample is None else ticks.get((believed.clock, believed.sample))
+        tick = None if number is None else guided.ticks[number]
         now_did, then_did = (None, None) if tick is None else (tick.now, tick.then)
         yield {
             "time_s": (believed.log_ns - first_ns) / 1e9,
@@ -187,32 +209,45 @@ def rows_of(replay: Replay, guided: Guided) -> Iterator[dict[str, object]]:
         }
 
 
-def _later_steps(pairs: list[tuple[Belief, Belief]]) -> float:
-    names = sorted({state for pair in pairs for belief in pair for state in belief.states})
-    now, then = ([names.index(pair[side].likely_state) for pair in pairs] for side in (0, 1))
+def _later_steps(now: Sequence[int], then: Sequence[int]) -> float:
+    numbers = np.array(now, dtype=np.int64)
+    changed = np.array(changes(now), dtype=np.int64)
     later = []
     for at in changes(then):
-        near = [t - at for t in changes(now) if now[t] == then[at]]
-        if near:
-            later.append(min(near, key=abs))
+        same = changed[numbers[changed] == then[at]]
+        if len(same):
+            later.append(_nearest(same, at) - at)
     return float(np.median(later)) if later else float("nan")
 
 
-def _events(side: Sequence[Did], *, guides: bool) -> list[int]:
-    """Ticks at which it begins to guide, or ends, while the operator drives."""
-    return [
-        k
-        for k, (before, did) in enumerate(pairwise(side), start=1)
-        if did.engaged and did.guides == guides and before.guides != guides
-    ]
+def _nearest(places: NDArray[Any], at: float) -> float:
+    """Of the rising places, one at least, the one nearest to `at`; of two the earlier one."""
+    behind = int(np.searchsorted(places, at))
+    beside = places[max(behind - 1, 0) : behind + 1]
+    return float(beside[np.argmin(np.abs(beside - at))])
 
 
-def _later_ms(now_ms: NDArray[np.float64], then_ms: NDArray[np.float64]) -> float:
+class _Events:
+    """When a fixture begins to guide, and ends, while the operator drives, ms."""
+
+    def __init__(self) -> None:
+        self.takes_hold_ms, self.lets_go_ms = array("d"), array("d")
+        self._guided: bool | None = None
+
+    def take(self, at_ms: float, did: Did) -> None:
+        """Take in what it does next."""
+        if did.engaged and self._guided is not None and did.guides != self._guided:
+            (self.takes_hold_ms if did.guides else self.lets_go_ms).append(at_ms)
+        self._guided = did.guides
+
+
+def _later_ms(now_ms: Sequence[float], then_ms: Sequence[float]) -> float:
     """Median of how much later each of `then_ms` has its nearest in `now_ms`."""
-    if not len(now_ms):
+    if not now_ms:
         return float("nan")
-    nearest = [float(min(now_ms - at_ms, key=abs)) for at_ms in then_ms]
-    later = [later_ms for later_ms in nearest if abs(later_ms) <= 1e3 * SAME_EVENT_S]
+    times_ms = np.sort(now_ms)
+    apart = [_nearest(times_ms, at_ms) - at_ms for at_ms in then_ms]
+    later = [later_ms for later_ms in apart if abs(later_ms) <= 1e3 * SAME_EVENT_S]
     return float(np.median(later)) if later else float("nan")
 
 
@@ -221,11 +256,9 @@ def _angle_deg(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
-def _rms(differences: Sequence[NDArray[np.float64]]) -> float:
-    if not differences:
-        return float("nan")
-    return float(np.sqrt(np.mean(np.sum(np.square(differences), axis=1))))
+def _share(count: int, of: int) -> float:
+    return count / of if of else float("nan")
 
 
 def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values)) if values else float("nan")
+    return float(np.mean(values)) if len(values) else float("nan")

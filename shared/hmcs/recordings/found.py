@@ -6,6 +6,8 @@ from __future__ import annotations
 import zlib
 from pathlib import Path
 
+from hmcs.errors import UserError
+
 COMMENT = "#"
 _MARK = f"{COMMENT} found by hmcs train --find-states; whoever changes a line makes it his own: "
 
@@ -18,12 +20,14 @@ def marked(text: str) -> str:
 def is_as_found(file: Path) -> bool:
     """Return whether a file was found and is unchanged since; False where there is none.
 
-    Raises OSError where it cannot be read.
+    Raises UserError where it cannot be read.
     """
     try:
         text = file.read_text(encoding="utf-8")
     except (FileNotFoundError, UnicodeDecodeError):
         return False
+    except OSError as error:
+        raise UserError(f"{file}: cannot be read: {error.strerror or error}") from error
     before, mark, said = text.rpartition(_MARK)
     return bool(mark) and said == f"{_sum(before)}\n"
 

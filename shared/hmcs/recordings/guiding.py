@@ -7,16 +7,11 @@ leads another way than it did then, the less would hand and robot have been wher
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hmcs.bus.counters import Sequences
-from hmcs.bus.keys import recognizer_in
 from hmcs.bus.messages import (
     Belief,
     Envelope,
@@ -31,48 +26,14 @@ from hmcs.fixtures.controller import Controller
 from hmcs.fixtures.exchanged import Fixture
 from hmcs.fixtures.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
-from hmcs.recordings.replaying import Replay
+from hmcs.recordings.replaying import Replay, recognizer_named, settings_in
+from hmcs.recordings.ticks import Did, Tick, Ticks
 from hmcs.translation import guides_of
 
 HEARD = (Motion, Step, Belief, RobotState, FixtureState)
 CONTROLLER = "fixture_controller/"
 """What the metadata of fixture controllers are named by."""
-
-
-class Did(NamedTuple):
-    """What a fixture does, or did, at one sample of the operator."""
-
-    state: str
-    """The task state whose fixture is applied; empty in free motion."""
-    reason: str
-    factor: float
-    """k, ½ in free motion."""
-    compliance: float
-    direction: NDArray[np.float64]
-    """The preferred one, unit length, or zero in free motion, shape (3,)."""
-    velocity: NDArray[np.float64]
-    """Commanded, m/s, shape (3,)."""
-    off_guide_m: float | None
-    """How far the robot is beside the guide; None where nobody knows."""
-    engaged: bool
-
-    @property
-    def guides(self) -> bool:
-        """Whether it is stiffer than free motion."""
-        return bool(self.state)
-
-
-class Tick(NamedTuple):
-    """One sample of the operator, and what is and was done with it."""
-
-    log_ns: int
-    device: str
-    """Boot of the input device."""
-    sample: int
-    """Its number."""
-    now: Did
-    then: Did | None
-    """None where no fixture was recorded to have answered it."""
+_LARGEST_SETTING = 1e9
 
 
 class Guided(NamedTuple):
@@ -80,7 +41,7 @@ class Guided(NamedTuple):
 
     followed: tuple[str, ...]
     """The models the recorded fixture followed, each once, in their order."""
-    ticks: tuple[Tick, ...]
+    ticks: Sequence[Tick]
     spent_s: float
     """Processor time."""
     notes: tuple[str, ...]
@@ -101,23 +62,21 @@ def guided(
     began_s = time.process_time()
     settings, active = _controller_told(content)
     again = _Again(replay, Safeguards() if settings is None else safeguards_told(settings), active)
-    then: dict[tuple[str, int], FixtureState] = {}
+    followed: dict[str, None] = {}
+    answered = False
     begun_ns = content.first_ns
     lasts_ns = max(round(content.duration_s * 1e9), 1)
     for recorded, envelope, message in content.of_any(*HEARD):
-        if isinstance(message, FixtureState) and envelope.origin is not None:
-            then[envelope.origin.boot, envelope.origin.seq] = message
+        origin = envelope.origin
+        if isinstance(message, FixtureState) and origin is not None:
+            again.ticks.add_then(origin.boot, origin.seq, _did(message))
+            followed |= dict.fromkeys([message.model] if message.model else ())
+            answered = True
             continue
         again.hear((recorded.log_ns - begun_ns) / 1e9, recorded, envelope, message)
         progress((recorded.log_ns - begun_ns) / lasts_ns)
-    ticks = tuple(
-        tick if told is None else tick._replace(then=_did(told))
-        for tick in again.ticks
-        for told in [then.get((tick.device, tick.sample))]
-    )
-    followed = tuple(dict.fromkeys(told.model for told in then.values() if told.model))
-    notes = _notes(again, settings is not None, bool(then), followed, replay.compared_with)
-    return Guided(followed, ticks, time.process_time() - began_s, tuple(notes))
+    notes = _notes(again, settings is not None, answered, tuple(followed), replay.compared_with)
+    return Guided(tuple(followed), again.ticks, time.process_time() - began_s, tuple(notes))
 
 
 def safeguards_told(settings: Mapping[str, Any]) -> Safeguards:
@@ -129,7 +88,7 @@ def safeguards_told(settings: Mapping[str, Any]) -> Safeguards:
     for name in Safeguards.__dataclass_fields__:
         milliseconds = settings.get(f"{name.removesuffix('_s')}_ms") if name[-2:] == "_s" else None
         value = settings.get(name) if milliseconds is None else milliseconds
-        if isinstance(value, int | float):
+        if isinstance(value, int | float) and 0 <= value <= _LARGEST_SETTING:
             told[name] = value if milliseconds is None else value / 1e3
     return Safeguards(**told)
 
@@ -142,8 +101,7 @@ class _Again:
 
     def __init__(self, replay: Replay, safeguards: Safeguards, active: bool) -> None:
         model = replay.model
-        self.ticks: list[Tick] = []
-        """Without what was done then."""
+        self.ticks = Ticks()
         self.lost = self.refused = self.robots = 0
         controller = Controller(safeguards)
         controller.load(model.name, guides_of(model))
@@ -152,7 +110,11 @@ class _Again:
         self._feed = ControllerFeed(controller)
         self._name, self._recorded_name = model.name, replay.compared_with
         self._sequences = Sequences()
-        self._beliefs = {(each.clock, each.step): each for each in replay.beliefs}
+        self._replayed = replay.beliefs
+        self._numbers = {
+            (each.clock, each.step): number for number, each in enumerate(replay.beliefs)
+        }
+        """Of each step among those that were replayed."""
 
     def hear(self, now_s: float, recorded: Recorded, envelope: Envelope, message: Message) -> None:
         """Take in a recorded message at its time."""
@@ -164,7 +126,7 @@ class _Again:
             case RobotState():
                 self.robots += 1
                 self._feed.on_robot(now_s, envelope.source, message, ())
-            case Belief() if recognizer_in(recorded.key).model == self._recorded_name:
+            case Belief() if recognizer_named(recorded.key) == self._recorded_name:
                 self._believed(message.clock, message.step)
 
     def _sampled(
@@ -179,23 +141,23 @@ class _Again:
         if made is None:
             self.refused += 1
             return
-        self.ticks.append(Tick(recorded.log_ns, source.boot, number, _would_do(made), None))
+        self.ticks.add(recorded.log_ns, source.boot, number, _would_do(made))
 
     def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
         """Take a step, and the belief after it where none was recorded that says when it came."""
         source = envelope.source
         if self._feed.on_step(now_s, source, step, envelope.origin) != "taken":
             return
-        believed = self._beliefs.get((source.boot, step.index))
-        if believed is not None and believed.recorded is None:
+        replayed = self._numbers.get((source.boot, step.index))
+        if replayed is not None and self._replayed[replayed].recorded is None:
             self._believed(source.boot, step.index)
 
     def _believed(self, clock: str, step: int) -> None:
-        """Take the replayed belief of a step."""
-        believed = self._beliefs.get((clock, step))
-        if believed is None:
+        """Take the replayed belief of a step; of several recognizers the first counts."""
+        number = self._numbers.get((clock, step))
+        if number is None:
             return
-        verdict = self._feed.on_belief(self._name, believed.replayed)
+        verdict = self._feed.on_belief(self._name, self._replayed[number].replayed)
         controller = self._feed.controller
         if verdict in ("taken", "early") and not controller.active:
             controller.activate(self._name)
@@ -229,8 +191,9 @@ def _notes(
 def _controller_told(content: RecordingContent) -> tuple[Mapping[str, Any] | None, bool]:
     """The settings of the recorded fixture controller, and whether it followed a model already."""
     for name, facts in content.metadata.items():
-        if name.startswith(CONTROLLER) and "settings" in facts:
-            return json.loads(facts["settings"]), bool(facts.get("active_model"))
+        settings = settings_in(facts) if name.startswith(CONTROLLER) else None
+        if settings is not None:
+            return settings, bool(facts.get("active_model"))
     return None, False
 
 

@@ -3,122 +3,172 @@
 Labels said while the hand moved are `Label` messages. Labels set afterwards stand in a CSV file
 beside the recording, `NAME.labels.csv` with the header `begin_s,end_s,state`, in seconds since the
 recording's first message; they count instead of those said. The recording is never changed. A line
-of that file that begins with # is a remark.
+of that file that begins with # is a remark. One of them has the recording's fingerprint: beside
+another recording of the same name the labels do not count. A file without it is taken as it is.
 """
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
 from hmcs.bus.messages import Label, Step
-from hmcs.recordings.found import COMMENT, is_as_found, marked
+from hmcs.recordings.fingerprints import fingerprint_of, is_of
+from hmcs.recordings.found import is_as_found, marked
+from hmcs.recordings.label_files import MOST_LABELS, LabelFile, labels_text, read_labels
 from hmcs.recordings.reading import RecordingContent, RecordingError
-from hmcs.recordings.stretches import NS_PER_S, Stretch, to_ns
+from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, to_ns, told
 from hmcs.whole_files import written_whole
 
-HEADER = ["begin_s", "end_s", "state"]
+SUFFIX = ".labels.csv"
 How = Literal["said meanwhile", "set afterwards", "found"]
+FAR_BEYOND_S = 1.0
+"""Who wrote a label that ends later than the recording by more than this meant something else than
+a rounded number."""
 
 
 def labels_beside(recording: Path) -> Path:
     """Return where labels of a recording are written that are set afterwards."""
-    return recording.with_name(f"{recording.stem}.labels.csv")
+    return recording.with_name(f"{recording.stem}{SUFFIX}")
 
 
 def how_labeled(content: RecordingContent) -> How:
-    """Return how the labels of a recording were set, those that count."""
-    beside = labels_beside(content.path)
-    if not beside.is_file():
+    """Return how the labels of a recording were set, those that count; raises as `labels_of`."""
+    beside = _written_beside(content)
+    if beside is None or _is_of_another(content, beside):
         return "said meanwhile"
-    return "found" if is_as_found(beside) else "set afterwards"
+    return "found" if is_as_found(labels_beside(content.path)) else "set afterwards"
 
 
 def labels_of(content: RecordingContent) -> tuple[Stretch, ...]:
     """Return the labels of a recording, in order: those beside it, else those said meanwhile.
 
-    Raises RecordingError for a file beside it that is none, naming the line.
+    Those beside it count if they are of this recording, see `label_notes`. Raises RecordingError,
+    naming file and line, for a file beside it that is none, and for labels that cannot be of a
+    recording that is whole.
     """
-    beside = labels_beside(content.path)
-    if beside.is_file():
-        return read_labels(beside, content.first_ns)
-    return _said(content)
+    beside = _written_beside(content)
+    if beside is None or _is_of_another(content, beside):
+        return _said(content)
+    _check_times(content, beside)
+    return beside.stretches
 
 
-def read_labels(file: Path, first_ns: int) -> tuple[Stretch, ...]:
-    """Return the labels in a file whose seconds count from `first_ns`.
+def label_notes(content: RecordingContent) -> tuple[str, ...]:
+    """Return what should be known of the labels beside a recording, a sentence each.
 
-    Raises RecordingError, naming file and line, for a row that is none or overlaps another.
+    Raises as `labels_of` does.
     """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{file}: no text that can be read: {error}") from error
-    stretches: list[Stretch] = []
-    rows = csv.reader(io.StringIO(text, newline=""))
-    if next(rows, []) != HEADER:
-        raise RecordingError(f"{file}:1: expected the header {','.join(HEADER)}")
-    for row in rows:
-        if not row or row[0].startswith(COMMENT):
-            continue
-        where = f"{file}:{rows.line_num}"
-        try:
-            begin_s, end_s = float(row[0]), float(row[1])
-            state = row[2].strip()
-        except (IndexError, ValueError):
-            raise RecordingError(f"{where}: expected {','.join(HEADER)}, not {row}") from None
-        if not (math.isfinite(begin_s) and math.isfinite(end_s) and begin_s < end_s and state):
-            raise RecordingError(f"{where}: expected begin_s below end_s, and a state")
-        stretch = Stretch(first_ns + to_ns(begin_s), first_ns + to_ns(end_s), state)
-        if stretches and stretch.begin_ns < stretches[-1].end_ns:
-            raise RecordingError(
-                f"{where}: begins before the label above it ends: let each end where the next one "
-                "begins, in the order of time"
-            )
-        stretches.append(stretch)
-    return tuple(stretches)
+    beside = _written_beside(content)
+    if beside is None:
+        return ()
+    name = labels_beside(content.path).name
+    if _is_of_another(content, beside):
+        return (
+            f"the labels in {name} are of another recording that had this name: they do not count; "
+            "remove that file, or, if they are of this one, its line with the fingerprint",
+        )
+    _check_times(content, beside)
+    return tuple(
+        f"{name}:{line}: label {told(stretch, content.first_ns)} ends after the recording, which "
+        f"lasts {content.duration_s:.3f} s"
+        for stretch, line in zip(beside.stretches, beside.lines, strict=True)
+        if ends_after(stretch, content.last_ns)
+    )
 
 
 def write_labels(
-    file: Path, stretches: Sequence[Stretch], first_ns: int, *, found: bool = False
-) -> None:
-    """Write labels as `read_labels` reads them, to the ns, whole or not at all.
+    content: RecordingContent, stretches: Sequence[Stretch], *, found: bool = False
+) -> Path | None:
+    """Write labels beside a recording as they are read, to the ns, whole or not at all.
 
-    Those that were `found` carry a remark that says so.
+    Those that were `found` carry a remark that says so. Where labels of another recording lie
+    there, they are moved aside; returns where to. Raises RecordingError where the file cannot be
+    written.
     """
-    rows = io.StringIO()
-    writer = csv.writer(rows, lineterminator="\n")
-    writer.writerow(HEADER)
-    for stretch in stretches:
-        times = (_seconds(at - first_ns) for at in (stretch.begin_ns, stretch.end_ns))
-        writer.writerow([*times, stretch.state])
-    text = rows.getvalue()
-    with written_whole(file) as unfinished:
-        unfinished.write_text(marked(text) if found else text, encoding="utf-8", newline="\n")
+    file = labels_beside(content.path)
+    try:
+        text = labels_text(stretches, content.first_ns, fingerprint_of(content.path))
+        aside = _moved_aside(content)
+        with written_whole(file) as unfinished:
+            unfinished.write_text(marked(text) if found else text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise RecordingError(f"{file}: cannot be written: {error.strerror or error}") from error
+    return aside
 
 
-def _seconds(ns: int) -> str:
-    """Seconds with as many digits as they need."""
-    return f"{ns / NS_PER_S:.9f}".rstrip("0").rstrip(".")
+def _written_beside(content: RecordingContent) -> LabelFile | None:
+    beside = labels_beside(content.path)
+    return read_labels(beside, content.first_ns) if beside.is_file() else None
+
+
+def _is_of_another(content: RecordingContent, written: LabelFile) -> bool:
+    try:
+        return written.fingerprint is not None and not is_of(written.fingerprint, content.path)
+    except OSError as error:
+        raise RecordingError(f"{content.path}: cannot be read: {error.strerror}") from error
+
+
+def _moved_aside(content: RecordingContent) -> Path | None:
+    """Where labels of another recording were moved to, lest they are lost."""
+    beside = labels_beside(content.path)
+    try:
+        written = _written_beside(content)
+    except RecordingError:
+        return None
+    if written is None or not _is_of_another(content, written):
+        return None
+    number = 1
+    while (
+        aside := beside.with_name(f"{content.path.stem}.labels-of-another-{number}.csv")
+    ).exists():
+        number += 1
+    beside.rename(aside)
+    return aside
+
+
+def _check_times(content: RecordingContent, written: LabelFile) -> None:
+    """Raise RecordingError where labels were written in another unit, or are of no part of it."""
+    file = labels_beside(content.path)
+    unit = misread_unit(written.stretches, content.first_ns, content.last_ns)
+    if unit:
+        raise RecordingError(
+            f"{file}: the recording lasts {content.duration_s:.3f} s, and the times of these "
+            f"labels read like {unit}"
+        )
+    if not content.whole or content.gaps:
+        # What they are of may be among what is missing.
+        return
+    for stretch, line in zip(written.stretches, written.lines, strict=True):
+        outside = stretch.begin_ns >= content.last_ns or stretch.begin_ns < content.first_ns
+        if outside or ends_after(stretch, content.last_ns + to_ns(FAR_BEYOND_S)):
+            raise RecordingError(
+                f"{file}:{line}: label {told(stretch, content.first_ns)} is outside of the "
+                f"recording, which lasts {content.duration_s:.3f} s: label what is in it"
+            )
 
 
 def _said(content: RecordingContent) -> tuple[Stretch, ...]:
     """Labels said meanwhile; one that names a step begins where that step did."""
-    began_ns: dict[tuple[str, int], int] = {}
-    for recorded, envelope, step in content.of(Step):
-        began_ns[envelope.source.boot, step.index + 1] = recorded.log_ns
     said = [
-        (began_ns.get((label.clock, label.step), recorded.log_ns), label.state)
-        for recorded, _, label in content.of(Label)
+        (recorded.log_ns, label.state.strip(), (label.clock, label.step))
+        for recorded, _, label in islice(content.of(Label), MOST_LABELS + 1)
     ]
-    end_ns = content.messages[-1].log_ns + 1 if content.messages else 0
-    begins = [*(begin for begin, _ in said), end_ns]
+    if len(said) > MOST_LABELS:
+        raise RecordingError(f"{content.path}: has more than {MOST_LABELS} labels")
+    named = {step for _, _, step in said}
+    began_ns = {
+        began: recorded.log_ns
+        for recorded, envelope, step in (content.of(Step) if named else ())
+        if (began := (envelope.source.boot, step.index + 1)) in named
+    }
+    begins = [began_ns.get(step, log_ns) for log_ns, _, step in said]
     return tuple(
         Stretch(begin, end, state)
-        for (begin, state), end in zip(said, begins[1:], strict=True)
+        for begin, end, (_, state, _) in zip(
+            begins, [*begins[1:], content.last_ns + 1], said, strict=False
+        )
         if state and begin < end
     )

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.recordings.demonstrations import whole_way
+from hmcs.recordings.demonstrations import LEAST_SAMPLES, way_of
+from hmcs.recordings.hands import hand_of
 from hmcs.recordings.labels import labels_beside, labels_of, write_labels
 from hmcs.recordings.parts import SUFFIX
 from hmcs.recordings.reading import RecordingContent, RecordingError
@@ -40,16 +41,32 @@ def outlined(content: RecordingContent, most: int = MOST_SAMPLES) -> MotionOutli
     Raises RecordingError as `labels_of` does.
     """
     labels = labels_of(content)
-    way = whole_way(content)
-    time_s, positions = np.zeros(0), np.zeros((0, 3))
-    if way is not None:
-        count = min(most, len(way.time_s))
-        chosen = np.unique(np.linspace(0, len(way.time_s) - 1, count).round().astype(int))
-        time_s, positions = way.time_s[chosen], way.positions[chosen]
-    at = np.array([label[:2] for label in labels], dtype=np.int64).reshape(-1, 2)
-    begin_s, end_s = ((at - content.first_ns) / NS_PER_S).T
+    time_s, positions = _thinned_out(content, most)
+    begin_s, end_s = (
+        np.array([(at - content.first_ns) / NS_PER_S for at in times])
+        for times in ([one.begin_ns for one in labels], [one.end_ns for one in labels])
+    )
     return MotionOutline(
         content.duration_s, time_s, positions, begin_s, end_s, tuple(one.state for one in labels)
+    )
+
+
+def _thinned_out(
+    content: RecordingContent, most: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and positions of the hand's way, at most so many, evenly chosen of all.
+
+    It is gone over twice, to be counted and to be chosen of: it may be too long to be held.
+    """
+    count = sum(1 for _ in way_of(hand_of(content)))
+    if count < LEAST_SAMPLES:
+        return np.zeros(0), np.zeros((0, 3))
+    chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+    wanted = set(chosen.tolist())
+    passed = [each for number, each in enumerate(way_of(hand_of(content))) if number in wanted]
+    return (
+        np.array([(each.log_ns - content.first_ns) / NS_PER_S for each in passed]),
+        np.array([each.position for each in passed]),
     )
 
 
@@ -65,15 +82,21 @@ def set_labels(
     """
     stretches = of_seconds(begin_s, end_s, states, content.first_ns)
     check_within(stretches, content.first_ns, content.last_ns)
-    file = labels_beside(content.path)
-    write_labels(file, stretches, content.first_ns)
-    return file
+    write_labels(content, stretches)
+    return labels_beside(content.path)
 
 
 def recordings_in(folder: Path) -> list[Path]:
     """Return the recordings in a folder, the newest first."""
-    files = [file for file in folder.glob(f"*{SUFFIX}") if file.is_file()]
-    return sorted(files, key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
+    found = []
+    for file in folder.glob(f"*{SUFFIX}"):
+        try:
+            if file.is_file():
+                found.append((file.stat().st_mtime_ns, file.name, file))
+        except OSError:
+            # It was moved away a moment ago.
+            continue
+    return [file for _, _, file in sorted(found, reverse=True)]
 
 
 def recording_named(folder: Path, name: str) -> Path:

@@ -2,39 +2,33 @@
 
 from __future__ import annotations
 
-import json
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_args
 
-from hmcs.bus.keys import recognizer_in
+from hmcs.bus.keys import KeyNameError, recognizer_in
 from hmcs.bus.messages import Belief, Evidence, Step
-from hmcs.recognition.layered import LayeredRecognizer, Layers, Precision
+from hmcs.bus.wire import schema_of
+from hmcs.errors import UserError
+from hmcs.recognition.layered import Precision
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizer import Guarded, Recognizer
-from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recordings.labels import labels_of
-from hmcs.recordings.reading import RecordingContent, RecordingError
+from hmcs.recordings.as_live import AsLive
+from hmcs.recordings.beliefs import Beliefs, Believed, Packed, Packer
+from hmcs.recordings.inspection import unread
+from hmcs.recordings.labels import label_notes, labels_of
+from hmcs.recordings.plain import NoMessageError, json_fields
+from hmcs.recordings.reading import MODEL_SUFFIX, RecordingContent, RecordingError
 from hmcs.recordings.stretches import Stretch
+from hmcs.shown import plain
 from hmcs.translation import belief_message, step_of
 
-
-class Believed(NamedTuple):
-    """One step, and what is and was believed after it."""
-
-    log_ns: int
-    clock: str
-    step: int
-    sample: int | None
-    """Number of the operator's sample that completed the step; None where it is not told."""
-    replayed: Belief
-    recorded: Belief | None
-    """Of the recognizer compared with; None where it said nothing of this step."""
-    label: str | None
-    """The state it truly was, where the recording has labels."""
+MOST_STEPS = 1_000_000
+"""That are replayed; they and their beliefs take up to a kilobyte each. A hand in steady motion
+makes as many in eleven hours."""
 
 
 class Replay(NamedTuple):
@@ -43,7 +37,7 @@ class Replay(NamedTuple):
     model: Model
     compared_with: str
     """Name of the recorded recognizer; empty where there is none."""
-    beliefs: tuple[Believed, ...]
+    beliefs: Sequence[Believed]
     spent_s: float
     """Processor time."""
     lasted_s: float
@@ -57,18 +51,28 @@ def kept_model(content: RecordingContent) -> Model:
 
     Raises RecordingError where there is none, or nobody knows which.
     """
-    kept = [file for file in content.attachments if file.endswith(".hmcs")]
-    followed = {f"{facts.get('active_model', '')}.hmcs" for facts in content.metadata.values()}
+    kept = [file for file in content.attachments if file.endswith(MODEL_SUFFIX)]
+    followed = {
+        f"{facts.get('active_model', '')}{MODEL_SUFFIX}" for facts in content.metadata.values()
+    }
     wanted = kept if len(kept) == 1 else [file for file in kept if file in followed]
     if len(wanted) != 1:
-        there = ", ".join(kept) or "none"
+        there = ", ".join(plain(file) for file in kept) or "none"
         raise RecordingError(
             f"{content.path}: kept with it are the models: {there}; name one with --model FILE"
         )
+    model = content.attachments[wanted[0]]
     with TemporaryDirectory() as folder:
-        file = Path(folder) / wanted[0]
-        file.write_bytes(content.attachments[wanted[0]])
-        return load_model(file)
+        # The name it is kept by is what somebody wrote, and may lead anywhere.
+        file = Path(folder) / f"kept{MODEL_SUFFIX}"
+        file.write_bytes(model)
+        try:
+            return load_model(file)
+        except UserError as error:
+            why = str(error).replace(f"{file}: ", "")
+            raise RecordingError(
+                f"{content.path}: the model {plain(wanted[0])} that is kept with it: {why}"
+            ) from error
 
 
 def replayed(
@@ -76,55 +80,65 @@ def replayed(
 ) -> Replay:
     """Return what a model's recognizer believes of a recording; `progress` is told the share done.
 
-    Where the recording has evidence of this very model, evidence is rounded as it was on its way.
-    Raises RecordingError where there are no steps, and where labels and recorded beliefs speak of
-    no state the model knows.
+    Where the recording has evidence of this very model, evidence is rounded as it was on its way,
+    and what was missing at a step is missing again. Raises RecordingError where there are no steps
+    or more than MOST_STEPS, and where labels and recorded beliefs speak of no state the model
+    knows.
     """
-    steps = list(content.of(Step))
-    if not steps:
+    count = content.schemas.get(schema_of(Step), 0)
+    if count > MOST_STEPS:
         raise RecordingError(
-            f"{content.path}: has no steps: the hand did not move, or it was cut off before"
+            f"{content.path}: has {count} steps, more than {MOST_STEPS}: replay a part of it"
         )
     name, recorded = _recorded(content, model)
-    precision = _precision(content, model)
     labels = labels_of(content)
     strangers = _strangers(content, model, recorded, labels)
-    beliefs: list[Believed] = []
+    precision = _precision(content, model)
+    beliefs, packer = Beliefs(), Packer()
     clock, recognizer, expected, label = "", None, -1, 0
-    anew, missing = 0, 0
+    anew, missing, first_step, first_ns, last_ns = 0, 0, 0, 0, 0
     began_s = time.process_time()
-    for number, (logged, envelope, step) in enumerate(steps):
+    for number, (logged, envelope, step) in enumerate(content.of(Step)):
         if envelope.source.boot == clock and step.index < expected:
             # It stands there twice: among the steps made before, and as it came.
             continue
         if recognizer is None or envelope.source.boot != clock or step.index != expected:
-            if recognizer is not None and envelope.source.boot != clock:
+            if recognizer is None:
+                first_step, first_ns = step.index, logged.log_ns
+            elif envelope.source.boot != clock:
                 anew += 1
-            elif recognizer is not None:
+            else:
                 missing += step.index - expected
             clock = envelope.source.boot
-            recognizer = _recognizer(model, step.index > 0, precision)
-        expected = step.index + 1
-        recognition = recognizer.step(step_of(step))
+            recognizer = AsLive(model, step.index > 0, precision)
+        expected, last_ns = step.index + 1, logged.log_ns
+        then = recorded.get((clock, step.index))
+        recognition = recognizer.step(step_of(step), _missing(model, then))
         while label < len(labels) and labels[label].end_ns <= logged.log_ns:
             label += 1
         labeled = label < len(labels) and labels[label].begin_ns <= logged.log_ns
-        beliefs.append(
-            Believed(
-                logged.log_ns,
-                clock,
-                step.index,
-                None if envelope.origin is None else envelope.origin.seq,
-                belief_message(model, recognition, clock),
-                recorded.get((clock, step.index)),
-                _state_of(labels[label]) if labeled else None,
-            )
+        beliefs.add(
+            logged.log_ns,
+            clock,
+            step.index,
+            None if envelope.origin is None else envelope.origin.seq,
+            packer.pack(belief_message(model, recognition, clock)),
+            then,
+            _state_of(labels[label]) if labeled else None,
         )
-        progress((number + 1) / len(steps))
+        progress((number + 1) / count)
+    if recognizer is None:
+        raise RecordingError(
+            f"{content.path}: has no steps: the hand did not move, or it was cut off before"
+        )
     spent_s = time.process_time() - began_s
-    lasted_s = (steps[-1][0].log_ns - steps[0][0].log_ns) / 1e9
-    notes = (*strangers, *_interruptions(steps[0][2].index, missing, anew))
-    return Replay(model, name, tuple(beliefs), spent_s, lasted_s, notes)
+    notes = (
+        *strangers,
+        *_interruptions(first_step, missing, anew),
+        *unread(content, Step, Belief),
+        *label_notes(content),
+    )
+    return Replay(model, name, beliefs, spent_s, (last_ns - first_ns) / 1e9, notes)
 
 
 def _interruptions(first_step: int, missing: int, anew: int) -> Iterator[str]:
@@ -145,7 +159,7 @@ def _interruptions(first_step: int, missing: int, anew: int) -> Iterator[str]:
 def _strangers(
     content: RecordingContent,
     model: Model,
-    recorded: Mapping[tuple[str, int], Belief],
+    recorded: Mapping[tuple[str, int], Packed],
     labels: Sequence[Stretch],
 ) -> list[str]:
     """What to tell of states the model does not know; RecordingError where it knows none."""
@@ -174,24 +188,61 @@ def _state_of(label: Stretch) -> str:
     return label.state.partition("/")[0]
 
 
-def _recognizer(model: Model, anywhere: bool, precision: Precision) -> Recognizer:
-    if isinstance(model.knowledge, Layers):
-        return Guarded(LayeredRecognizer(model, anywhere=anywhere, precision=precision))
-    return recognizer_of(model, anywhere=anywhere)
+def _missing(model: Model, then: Packed | None) -> frozenset[int]:
+    """Indices of the gestemes whose evidence this very model lacked live at a step."""
+    if then is None or then.model_hash != model.hash:
+        return frozenset()
+    return frozenset(
+        number for number, name in enumerate(model.gesteme_names) if name in then.missing_gestemes
+    )
 
 
-def _recorded(content: RecordingContent, model: Model) -> tuple[str, dict[tuple[str, int], Belief]]:
+def recognizer_named(key: str) -> str:
+    """Return the recognizer whose belief a key is of: its chunk behind `model`.
+
+    Of `…/model/NAME/belief` as of `…/model/NAME/belief/INSTANCE`; empty for any other key.
+    """
+    try:
+        return recognizer_in(key).model
+    except KeyNameError:
+        return ""
+
+
+def settings_in(facts: Mapping[str, str]) -> Mapping[str, Any] | None:
+    """Return the settings a process reported; None where none are kept that can be read."""
+    try:
+        return json_fields(facts.get("settings", ""))
+    except NoMessageError:
+        return None
+
+
+def _recorded(content: RecordingContent, model: Model) -> tuple[str, dict[tuple[str, int], Packed]]:
     """The recorded beliefs to compare with: of this very model, else of the one that said most."""
-    by_name: dict[str, dict[tuple[str, int], Belief]] = {}
+    counts: Counter[str] = Counter()
     hashes: dict[str, str] = {}
     for logged, _, belief in content.of(Belief):
-        name = recognizer_in(logged.key).model
-        by_name.setdefault(name, {})[belief.clock, belief.step] = belief
+        name = recognizer_named(logged.key)
+        counts[name] += 1
         hashes[name] = belief.model_hash
-    if not by_name:
+    if not counts:
         return "", {}
-    name = max(by_name, key=lambda each: (hashes[each] == model.hash, len(by_name[each])))
-    return name, by_name[name]
+    name = max(counts, key=lambda each: (hashes[each] == model.hash, counts[each]))
+    if counts[name] > 2 * MOST_STEPS:
+        raise RecordingError(f"{content.path}: has {counts[name]} beliefs: replay a part of it")
+    packer, kept = Packer(), dict[tuple[str, int], Packed]()
+    for logged, _, belief in content.of(Belief):
+        if recognizer_named(logged.key) != name or not _is_of_states(belief):
+            continue
+        at = (belief.clock, belief.step)
+        # Of several processes that work for a model one may have had all evidence.
+        if at not in kept or (kept[at].missing_gestemes and not belief.missing_gestemes):
+            kept[at] = packer.pack(belief)
+    return name, kept
+
+
+def _is_of_states(belief: Belief) -> bool:
+    """Whether it has states, and a probability for each."""
+    return 0 < len(belief.states) == len(belief.probabilities)
 
 
 def _precision(content: RecordingContent, model: Model) -> Precision:
@@ -202,7 +253,7 @@ def _precision(content: RecordingContent, model: Model) -> Precision:
     ):
         return "float64"
     for name, facts in content.metadata.items():
-        if name.startswith("gesteme_classifier/") and "settings" in facts:
-            said = json.loads(facts["settings"]).get("precision", "float32")
-            return cast(Precision, said)
+        settings = settings_in(facts) if name.startswith("gesteme_classifier/") else None
+        if settings is not None and settings.get("precision") in get_args(Precision):
+            return cast(Precision, settings["precision"])
     return "float32"

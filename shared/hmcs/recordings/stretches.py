@@ -16,6 +16,11 @@ from hmcs.errors import UserError
 NS_PER_S = 1_000_000_000
 _SLACK_NS = 1_000_000
 """So far a label may reach beyond the last message: what shows it may have rounded."""
+_UNITS = (("seconds", 1), ("milliseconds", 10**3), ("microseconds", 10**6), ("nanoseconds", 10**9))
+_LEAST_SHARE = 0.05
+"""Of a recording that labels in another unit reach over; who means its end writes less."""
+_SINCE_1970_S = (1e9, 4e9)
+"""Seconds since 1970 from 2001 to 2096."""
 
 
 class LabelError(UserError):
@@ -87,11 +92,39 @@ def of_seconds(
 def check_within(stretches: Iterable[Stretch], first_ns: int, last_ns: int) -> None:
     """Raise LabelError for a stretch that leaves a recording from `first_ns` to `last_ns`."""
     for stretch in stretches:
-        if stretch.begin_ns < first_ns or stretch.end_ns > last_ns + _SLACK_NS:
+        if stretch.begin_ns < first_ns or ends_after(stretch, last_ns):
             raise LabelError(
                 f"label {told(stretch, first_ns)} is outside of the recording, which lasts "
                 f"{(last_ns - first_ns) / NS_PER_S:.3f} s: label what is in it"
             )
+
+
+def ends_after(stretch: Stretch, last_ns: int) -> bool:
+    """Return whether a stretch ends after a recording whose last message is of `last_ns`."""
+    return stretch.end_ns > last_ns + _SLACK_NS
+
+
+def misread_unit(stretches: Sequence[Stretch], first_ns: int, last_ns: int) -> str:
+    """Return in which unit the times of stretches seem to have been written instead of seconds.
+
+    With what to do about it; empty where they are of a recording from `first_ns` to `last_ns`, or
+    nobody can tell.
+    """
+    latest_s = max((stretch.end_ns - first_ns for stretch in stretches), default=0) / NS_PER_S
+    lasts_s = (last_ns - first_ns) / NS_PER_S
+    for unit, in_second in _UNITS:
+        if _SINCE_1970_S[0] <= latest_s / in_second <= _SINCE_1970_S[1]:
+            return (
+                f"{unit} since 1970: write seconds since the recording began, which was "
+                f"{first_ns / NS_PER_S:.3f} s since then"
+            )
+    for unit, in_second in _UNITS[1:]:
+        if (
+            latest_s > 2 * lasts_s
+            and _LEAST_SHARE * lasts_s <= latest_s / in_second <= lasts_s + 1.0
+        ):
+            return f"{unit}: divide them by {in_second}"
+    return ""
 
 
 def to_ns(seconds: float) -> int:

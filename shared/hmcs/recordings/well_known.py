@@ -26,6 +26,9 @@ TRAIL_EVERY_NS = 100_000_000
 TRAIL_TOLD_NS = 1_000_000_000
 """...and is written as a whole once in such a time."""
 
+MOST_NAMELESS = 16
+"""So many robots are followed whose joints nobody has named."""
+
 _TIME = {
     "type": "object",
     "title": "time",
@@ -79,6 +82,15 @@ class Showing:
         self._trail: deque[dict[str, Any]] = deque(maxlen=TRAIL_POSES)
         self._grown_ns = self._told_ns = -TRAIL_TOLD_NS
         self._shown_ns: dict[str, int] = {}
+        self._joints: dict[str, tuple[str, ...]] = {}
+        self.nameless: set[str] = set()
+        """Robots whose joints nobody has named as their description does. They are not shown: a
+        viewer moves a robot's model by those names alone."""
+
+    def name_joints(self, robot: str, joints: tuple[str, ...]) -> None:
+        """Note what a robot's description calls its joints, in the order of their positions."""
+        self._joints[robot] = joints
+        self.nameless.discard(robot)
 
     def of(self, fields: dict[str, Any], log_ns: int) -> Iterator[Shown]:
         """Yield what is to be shown of a message, by its fields as `fields_of` gives them."""
@@ -89,19 +101,13 @@ class Showing:
             return
         self._shown_ns[schema] = log_ns
         if schema == _MOTION:
-            turned = fields["orientation"] or _UPRIGHT
+            turned = fields.get("orientation") or _UPRIGHT
             pose = _pose(fields["position"], turned)
             yield Shown(f"{PREFIX}hand", "foxglove.PoseInFrame", _in_frame(log_ns, OPERATOR, pose))
             return
         pose = _pose(fields["tool_position"], fields["tool_orientation"])
         yield Shown(f"{PREFIX}tool", "foxglove.PoseInFrame", _in_frame(log_ns, BASE, pose))
-        joints = [
-            {"name": f"joint_{number}", "position": position, "velocity": velocity}
-            for number, (position, velocity) in enumerate(
-                zip(fields["joint_positions"], fields["joint_velocities"], strict=True), start=1
-            )
-        ]
-        states = {"timestamp": _time(log_ns), "joints": joints}
+        states = self._joint_states(fields, log_ns)
         yield Shown(f"{PREFIX}joints", "foxglove.JointStates", states)
         if log_ns - self._grown_ns >= TRAIL_EVERY_NS:
             self._grown_ns = log_ns
@@ -110,6 +116,21 @@ class Showing:
             self._told_ns = log_ns
             trail = {"timestamp": _time(log_ns), "frame_id": BASE, "poses": list(self._trail)}
             yield Shown(f"{PREFIX}trail", "foxglove.PosesInFrame", trail)
+
+    def _joint_states(self, fields: dict[str, Any], log_ns: int) -> dict[str, Any]:
+        """Its joints as far as anybody named them."""
+        robot, positions = fields["robot"], fields["joint_positions"]
+        velocities = fields["joint_velocities"]
+        if robot not in self._joints and len(self.nameless) < MOST_NAMELESS:
+            self.nameless.add(robot)
+        names = self._joints.get(robot, ())
+        if not len(names) == len(positions) == len(velocities):
+            names = ()
+        joints = [
+            {"name": name, "position": position, "velocity": velocity}
+            for name, position, velocity in zip(names, positions, velocities, strict=False)
+        ]
+        return {"timestamp": _time(log_ns), "joints": joints}
 
 
 def _time(log_ns: int) -> dict[str, int]:

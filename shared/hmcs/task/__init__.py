@@ -24,6 +24,7 @@ from hmcs.task.parts import (
     Recognition,
     RobotSetup,
     State,
+    ToolSetup,
     Workspace,
 )
 from hmcs.task.values import AXES
@@ -41,6 +42,7 @@ __all__ = [
     "State",
     "Task",
     "TaskFileError",
+    "ToolSetup",
     "Workspace",
     "check_task",
     "find_task",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar, get_args
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
+from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
 from hmcs.task.fixture_parts import FixtureSetup
 from hmcs.task.model import Draft, Location, Task, contradictions, unknown
@@ -24,6 +26,14 @@ from hmcs.task.values import Distribution
 from hmcs.task.yaml_lines import Document, YamlError, read_yaml
 
 T = TypeVar("T")
+
+MOST_BYTES = 256 * 1024
+"""A task of a hundred states, each with a fixture of its own, takes some 60,000; reading takes up
+to a second for so many."""
+MOST_TOLD = 50
+"""So many mistakes are told of a file; whoever mends those reads on."""
+LONGEST_MESSAGE = 500
+"""Characters of what is told of one mistake, which may quote the file."""
 
 
 class Problem(NamedTuple):
@@ -57,7 +67,7 @@ def load_task(path_or_name: str | Path) -> Task:
     task, problems = _read(file)
     if task is None:
         raise TaskFileError(problems)
-    return _with_files_beside(task, file.parent)
+    return _with_files_beside(task, file)
 
 
 def check_task(path_or_name: str | Path) -> list[Problem]:
@@ -71,7 +81,7 @@ def check_task(path_or_name: str | Path) -> list[Problem]:
 def problem_at(path_or_name: str | Path, location: Location, message: str) -> Problem:
     """Return a mistake that stands at a field of a task file, with its line."""
     file = find_task(path_or_name)
-    document = read_yaml(file.read_text(encoding="utf-8-sig"))
+    document = read_yaml(_text(file))
     return Problem(str(file), _line(document, location), _dotted(location), message)
 
 
@@ -92,37 +102,53 @@ def find_task(path_or_name: str | Path) -> Path:
     """
     if str(path_or_name) in shipped_tasks():
         return _shipped_folder() / f"{path_or_name}.yaml"
-    if Path(path_or_name).is_file():
-        return Path(path_or_name)
-    what = "a folder" if Path(path_or_name).is_dir() else "no such file"
-    names = ", ".join(shipped_tasks())
-    message = f"{what}, expected a task file or one of the shipped tasks (choose of: {names})"
-    raise TaskFileError([Problem(str(path_or_name), 1, "", message)])
+    try:
+        read_bounded(path_or_name, MOST_BYTES)
+    except UnreadableFileError as error:
+        names = ", ".join(shipped_tasks())
+        message = f"{error.what}; expected a task file or one of the shipped tasks ({names})"
+        raise TaskFileError([Problem(str(path_or_name), 1, "", message)]) from error
+    return Path(path_or_name)
 
 
-def _with_files_beside(task: Task, folder: Path) -> Task:
+def _with_files_beside(task: Task, file: Path) -> Task:
     """Return the task with the files that it names as absolute paths."""
     if all(region.file is None for region in task.workspace.forbidden):
         return task
     forbidden = tuple(
         region
         if region.file is None
-        else region.model_copy(update={"file": str((folder / region.file).resolve())})
-        for region in task.workspace.forbidden
+        else region.model_copy(update={"file": _beside(file, index, region.file)})
+        for index, region in enumerate(task.workspace.forbidden)
     )
     workspace = task.workspace.model_copy(update={"forbidden": forbidden})
     return task.model_copy(update={"workspace": workspace})
+
+
+def _beside(file: Path, index: int, named: str) -> str:
+    try:
+        return str((file.parent / named).resolve())
+    except (OSError, RuntimeError, ValueError) as error:
+        # A null byte, or links that lead in a circle.
+        location = ("workspace", "forbidden", index, "file")
+        problem = problem_at(file, location, f"{named!r:.60} cannot be a path: {error}")
+        raise TaskFileError([problem]) from error
 
 
 def _shipped_folder() -> Path:
     return Path(str(resources.files("hmcs"))) / "tasks"
 
 
+def _text(file: Path) -> str:
+    """Return the text of a task file; raises UnreadableFileError and UnicodeDecodeError."""
+    return read_bounded(file, MOST_BYTES).decode("utf-8-sig")
+
+
 def _read(file: Path) -> tuple[Task | None, list[Problem]]:
     try:
-        document = read_yaml(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        return None, [Problem(str(file), 1, "", f"cannot be read: {error.strerror}")]
+        document = read_yaml(_text(file))
+    except UnreadableFileError as error:
+        return None, [Problem(str(file), 1, "", error.what)]
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         return None, [Problem(str(file), line, "", "not UTF-8 text, expected a YAML file")]
@@ -141,14 +167,29 @@ def _read(file: Path) -> tuple[Task | None, list[Problem]]:
     except ValidationError as error:
         details = error.errors(include_url=False)
         # Contradictions of the whole come without a location; the draft tells them with one.
-        found += [_explain(detail) for detail in details if detail["loc"]]
+        found += [_explain(detail) for detail in details[: MOST_TOLD + 1] if detail["loc"]]
         found += contradictions(_draft(data))
+    return None if found else task, _problems(file, document, found)
+
+
+def _problems(
+    file: Path, document: Document, found: Sequence[tuple[Location, str]]
+) -> list[Problem]:
+    """Return what was found in the order of its lines, and no more of it than is told."""
     problems = [
-        Problem(str(file), _line(document, location), _dotted(location), message)
-        for location, message in found
+        Problem(str(file), _line(document, location), _dotted(location), _shortened(message))
+        for location, message in found[:MOST_TOLD]
     ]
     problems.sort(key=lambda problem: problem.line)
-    return None if problems else task, problems
+    if len(found) > MOST_TOLD:
+        problems.append(
+            Problem(str(file), problems[-1].line, "", "there are more mistakes: mend these first")
+        )
+    return problems
+
+
+def _shortened(message: str) -> str:
+    return message if len(message) <= LONGEST_MESSAGE else f"{message[: LONGEST_MESSAGE - 1]}…"
 
 
 def _draft(data: dict[Any, Any]) -> Draft:

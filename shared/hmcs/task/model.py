@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
+from itertools import islice
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
@@ -22,6 +23,9 @@ from hmcs.task.parts import (
 from hmcs.task.values import TWIST_AXES, Distribution, Name, Part
 
 Location = tuple[str | int, ...]
+
+_MOST_UNKNOWN = 50
+"""So many unknown names are told."""
 
 
 class Task(Part):
@@ -117,7 +121,8 @@ def contradictions(draft: Draft) -> list[Contradiction]:
     found += _narrow_volumes(draft)
     found += _blocked_axes(draft)
     if draft.complete:
-        strangers = list(_unknown_names(draft))
+        # Which name is nearest is looked for among all: that takes its time.
+        strangers = list(islice(_unknown_names(draft), _MOST_UNKNOWN))
         # A misspelled name hides a way; what can be reached is told once the names are right.
         found += strangers or _unreachable(draft)
     return found
@@ -140,15 +145,17 @@ def _unknown_names(draft: Draft) -> Iterator[Contradiction]:
     states = {state.name for _, state in draft.states}
     gestemes = {gesteme.name for _, gesteme in draft.gestemes}
     for index, state in draft.states:
+        before: set[str] = set()
         for place, name in enumerate(state.gestemes):
             if name not in gestemes:
                 yield Contradiction(
                     ("states", index, "gestemes", place), unknown("gesteme", name, gestemes)
                 )
-            if name in state.gestemes[:place]:
+            if name in before:
                 yield Contradiction(
                     ("states", index, "gestemes", place), f"{name!r} stands twice, expected once"
                 )
+            before.add(name)
         for name in state.next:
             if name not in states:
                 yield Contradiction(("states", index, "next", name), unknown("state", name, states))

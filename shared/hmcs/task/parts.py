@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -19,6 +20,22 @@ from hmcs.task.values import (
     SignedAxis,
     different,
 )
+
+
+def _check_measures(
+    part: Part,
+    shape: str,
+    wanted: set[str],
+    measures: tuple[str, ...],
+    optional: Set[str] = frozenset(),
+) -> None:
+    """Raise ValueError unless a shape has of all measures those it needs and no others."""
+    given = {measure for measure in measures if getattr(part, measure) is not None}
+    missing, needless = wanted - given, given - wanted - optional
+    if missing:
+        raise ValueError(f"a {shape} needs {' and '.join(sorted(missing))}")
+    if needless:
+        raise ValueError(f"a {shape} has no {' and no '.join(sorted(needless))}")
 
 
 class Gesteme(Part):
@@ -81,16 +98,7 @@ class Obstacle(Part):
     @model_validator(mode="after")
     def _has_its_measures(self) -> Self:
         wanted = {"box": {"size_m"}, "sphere": {"radius_m"}, "cylinder": {"radius_m", "length_m"}}
-        given = {
-            measure
-            for measure in ("size_m", "radius_m", "length_m")
-            if getattr(self, measure) is not None
-        }
-        missing, needless = wanted[self.shape] - given, given - wanted[self.shape]
-        if missing:
-            raise ValueError(f"a {self.shape} needs {' and '.join(sorted(missing))}")
-        if needless:
-            raise ValueError(f"a {self.shape} has no {' and no '.join(sorted(needless))}")
+        _check_measures(self, self.shape, wanted[self.shape], ("size_m", "radius_m", "length_m"))
         return self
 
 
@@ -128,12 +136,7 @@ class ForbiddenRegion(Part):
         }[self.shape]
         optional = {"scale"} if self.shape == "mesh" else set()
         measures = ("normal", "size_m", "radius_m", "end_m", "file", "scale")
-        given = {measure for measure in measures if getattr(self, measure) is not None}
-        if wanted - given:
-            raise ValueError(f"a {self.shape} needs {' and '.join(sorted(wanted - given))}")
-        if given - wanted - optional:
-            needless = " and no ".join(sorted(given - wanted - optional))
-            raise ValueError(f"a {self.shape} has no {needless}")
+        _check_measures(self, self.shape, wanted, measures, optional)
         if self.normal is not None and not any(self.normal):
             raise ValueError("normal is [0, 0, 0], expected a direction")
         return self
@@ -186,6 +189,30 @@ class Cooperation(Part):
     """The sensor passes what is slower (−3 dB)."""
 
 
+class ToolSetup(Part):
+    """What the tool fills of the room, tool frame; the fixture keeps all of it out of regions."""
+
+    shape: Literal["capsule", "box"]
+    position_m: Point = (0.0, 0.0, 0.0)
+    """Where a capsule begins; of the center of a box."""
+    end_m: Point | None = None
+    """Where a capsule ends."""
+    size_m: tuple[Positive, Positive, Positive] | None = None
+    """Full lengths of a box along its x, y, z."""
+    orientation_xyzw: Rotation | None = None
+    """Of a box; by default along the tool frame."""
+    radius_m: NotNegative | None = None
+    """Of a capsule; a box grows by it and is rounded off, by default not at all."""
+
+    @model_validator(mode="after")
+    def _has_its_measures(self) -> Self:
+        wanted = {"capsule": {"end_m", "radius_m"}, "box": {"size_m"}}[self.shape]
+        optional = {"orientation_xyzw", "radius_m"} if self.shape == "box" else set()
+        measures = ("end_m", "size_m", "orientation_xyzw", "radius_m")
+        _check_measures(self, self.shape, wanted, measures, optional)
+        return self
+
+
 class RobotSetup(Part):
     """The robot, and where it begins."""
 
@@ -200,5 +227,16 @@ class RobotSetup(Part):
     """Of the tool, base frame; kept during the task."""
     tool_radius_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     """The tool is kept out of forbidden regions as a ball of this size about its tip."""
+    tool: ToolSetup | None = None
+    """What the tool fills of the room where it is no ball; instead of tool_radius_m."""
     speed_limit_m_s: Positive = 0.25
     angular_speed_limit_rad_s: Positive = 0.5
+
+    @model_validator(mode="after")
+    def _has_one_tool(self) -> Self:
+        if self.tool is not None and self.tool_radius_m > 0:
+            raise ValueError(
+                f"tool_radius_m ({self.tool_radius_m:g}) makes the tool a ball and tool a "
+                f"{self.tool.shape}: leave one of them out"
+            )
+        return self

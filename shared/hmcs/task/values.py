@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -26,11 +27,11 @@ def _name(name: str) -> str:
 def _uniform(value: Any) -> Any:
     if not isinstance(value, (list, tuple)):
         return value
-    twice = sorted({str(item) for item in value if value.count(item) > 1})
-    if twice:
-        raise ValueError(f"{', '.join(twice)} stands twice in the list, expected each name once")
     if not all(isinstance(item, str) for item in value):
         raise ValueError("expected a list of names, or a mapping of names to probabilities")
+    twice = sorted(name for name, times in Counter(value).items() if times > 1)
+    if twice:
+        raise ValueError(f"{', '.join(twice)} stands twice in the list, expected each name once")
     return {name: 1.0 / len(value) for name in value}
 
 

@@ -172,7 +172,7 @@ def test_a_recording_of_steps_alone_has_no_fixture_and_says_so(
     said: list[Logged], again: Again
 ) -> None:
     replay, fixture = again([each for each in said if each.is_of(Step)])
-    assert fixture.ticks == ()
+    assert not fixture.ticks
     assert any("no sample of the operator's device" in note for note in fixture.notes)
     assert fixtures_compared(fixture).ticks == 0
     assert {row["replayed_factor"] for row in rows_of(replay, fixture)} == {""}

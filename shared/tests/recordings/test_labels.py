@@ -35,8 +35,7 @@ def test_labels_beside_a_recording_count_instead_and_never_change_it(
     path = maker.write(performed())
     before = path.read_bytes()
     said = labels_of(read(path))
-    first_ns = read(path).messages[0].log_ns
-    write_labels(labels_beside(path), [said[0]._replace(state="other")], first_ns)
+    write_labels(read(path), [said[0]._replace(state="other")])
     assert [label.state for label in labels_of(read(path))] == ["other"]
     assert path.read_bytes() == before
     (demonstration,) = demonstrations_of(read(path))

@@ -75,7 +75,7 @@ def test_labels_that_are_set_stand_beside_the_recording_which_stays_as_it_was(
     path = maker.write(performed(("go", "turn")))
     before = path.read_bytes()
     file = set_labels(read(path), [0.1, 0.5], [0.5, 0.9], ["turn", "go"])
-    assert file.read_text() == "begin_s,end_s,state\n0.1,0.5,turn\n0.5,0.9,go\n"
+    assert file.read_text().startswith("begin_s,end_s,state\n0.1,0.5,turn\n0.5,0.9,go\n# of ")
     assert path.read_bytes() == before
     assert outlined(read(path)).states == ("turn", "go")
     assert how_labeled(read(path)) == "set afterwards"
@@ -151,7 +151,7 @@ def test_labels_made_of_demonstrations_make_the_very_same_again(
     path = maker.write([*once, *once])
     content = read(path)
     given = [each._replace(states=("a",) * 50 + ("b",) * 70) for each in performances_of(content)]
-    write_labels(labels_beside(path), stretches_of(given, content.first_ns), content.first_ns)
+    write_labels(content, stretches_of(given, content.first_ns))
     again = demonstrations_of(read(path))
     for one, other in zip(given, again, strict=True):
         assert one.states == other.states
@@ -170,7 +170,7 @@ def test_found_labels_are_told_from_those_somebody_changed(
     assert not is_as_found(file)
     assert how_labeled(content) == "said meanwhile"
     said = labels_of(content)
-    write_labels(file, said, content.first_ns, found=True)
+    write_labels(content, said, found=True)
     assert how_labeled(content) == "found"
     assert labels_of(content) == said
     file.write_text(file.read_text().replace("turn", "go"))

@@ -26,7 +26,7 @@ from hmcs_local.demo.recording import Recording, load_recording
 from hmcs_local.demo.report import write_report
 from hmcs_local.demo.summary import RunFacts, summarize
 from hmcs_local.demo.truth import RunError
-from hmcs_local.launcher import interruptible
+from hmcs_local.interrupts import interruptible
 
 TASK = "human-shapes"
 DRAWINGS = tuple(range(1, 8))

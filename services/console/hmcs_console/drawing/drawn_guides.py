@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hmcs.recognition.model import Model
 from hmcs_console.drawing.geometry import line
 from hmcs_console.drawing.layout import Layout, anchored, laid_out
+from hmcs_console.drawing.nodes import node
 from hmcs_console.drawing.palette import color_of, faint
 from hmcs_console.order import Order, order_of
 from hmcs_console.seeing.models import gesteme_of, guide_of
@@ -76,7 +77,7 @@ class DrawnGuides:
             self._drawn[state] = gesteme
             self._ways[state] = guide.points[-1]
             self._lines[state] = self._scene.add_line_segments(
-                f"/guides/{state}",
+                node("guides", state),
                 line(guide.points),
                 faint(color_of(state, model.state_names)),
                 thickness=_FAINT_M,

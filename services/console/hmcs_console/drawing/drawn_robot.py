@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+import trimesh
 import viser
 import yourdfpy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from viser.transforms import SO3
 
 from hmcs.motion.quaternions import product
 from hmcs_console.drawing.geometry import wxyz
+from hmcs_console.drawing.nodes import node_in
 
 _STILL = 1e-4
 """A joint that moved no more, rad or m, is not drawn anew: at a meter that is 0.1 mm."""
@@ -49,7 +51,9 @@ class DrawnRobot(ViserUrdf):
 
     def __init__(self, server: viser.ViserServer, robot: yourdfpy.URDF, root: str) -> None:
         """Draw it below the node `root`, with its joints at zero."""
-        super().__init__(server, robot, root_node_name=root)
+        # It calls nodes by what stands in the robot's files.
+        named = cast(viser.ViserServer, _Named(_NamedScene(server.scene)))
+        super().__init__(named, robot, root_node_name=root)
         self.update_cfg(np.zeros(robot.num_actuated_joints))
         frames = zip(robot.joint_map.values(), self._joint_frames, strict=False)
         hinges = ((hinge_of(joint), frame) for joint, frame in frames)
@@ -70,16 +74,30 @@ class DrawnRobot(ViserUrdf):
                     frame.wxyz = wxyz(product(hinge.orientation, turned(hinge.axis, stands)))
 
 
+class _NamedScene:
+    """A scene whose nodes may be called anything."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+
+    def add_frame(self, name: str, **settings: Any) -> viser.FrameHandle:
+        return self._scene.add_frame(node_in(name), **settings)
+
+    def add_mesh_trimesh(self, name: str, mesh: trimesh.Trimesh) -> viser.GlbHandle:
+        return self._scene.add_mesh_trimesh(node_in(name), mesh)
+
+
+class _Named(NamedTuple):
+    scene: _NamedScene
+
+
 def hinge_of(joint: yourdfpy.Joint) -> Hinge | None:
     """Return what is to be known of a joint of a description; None for one that does not move."""
-    if joint.type not in ("revolute", "continuous", "prismatic"):
+    axis = np.asarray(joint.axis, dtype=float)
+    if joint.type not in ("revolute", "continuous", "prismatic") or not axis.any():
         return None
     origin = np.eye(4) if joint.origin is None else joint.origin
-    axis, slides, mimic = (
-        np.asarray(joint.axis, dtype=float),
-        joint.type == "prismatic",
-        joint.mimic,
-    )
+    slides, mimic = joint.type == "prismatic", joint.mimic
     return Hinge(
         leader=joint.name if mimic is None else mimic.joint,
         scale=1.0 if mimic is None else mimic.multiplier,

@@ -21,6 +21,8 @@ from hmcs_console.seeing.seen import Picture
 
 TRAILS_EVERY_S = 0.1
 """How often trails are drawn: a long one is more to send than all else that moves."""
+LOOKS_EVERY_S = 5.0
+"""How often a robot is loaded anew at most: it takes its time, and nothing is drawn meanwhile."""
 _ARROW_M = 0.12
 _M_PER_N = 0.02
 _LONGEST_FORCE_M = 0.3
@@ -44,18 +46,23 @@ class Scene:
         self._trails_s = 0.0
         self._direction = self._arrow("/arrows/direction", DIRECTION)
         self._force = self._arrow("/arrows/force", FORCE)
+        self._told: RobotLooks | None = None
         self._looks: RobotLooks | None = None
+        self._loaded_s = -LOOKS_EVERY_S
         self._robot: DrawnRobot | None = None
 
     def draw(self, picture: Picture, model: Model | None) -> None:
         """Draw a moment, with the guides of the model that is followed."""
-        if picture.looks is not self._looks:
-            self._load(picture.looks)
+        now_s = time.monotonic()
+        if picture.looks is not self._told and now_s - self._loaded_s >= LOOKS_EVERY_S:
+            self._told = picture.looks
+            if picture.looks != self._looks:
+                self._loaded_s = now_s
+                self._load(picture.looks)
         if picture.robot is not None:
             self._draw_robot(picture.robot)
         self._guides.draw(picture, model)
         self._draw_arrows(picture.robot, picture.fixture)
-        now_s = time.monotonic()
         if now_s - self._trails_s >= TRAILS_EVERY_S:
             self._trails_s = now_s
             self._draw_trails((picture.robot_trail, picture.hand_trail))
@@ -70,9 +77,10 @@ class Scene:
         try:
             self._server.scene.add_frame("/robot", show_axes=False)
             self._robot = DrawnRobot(self._server, load_robot(looks), "/robot")
-        except Exception:
+        except Exception as error:
             # Whatever a description does to its parsers, the tool is drawn all the same.
-            self._log.warning("the robot cannot be drawn", exc_info=True)
+            reason = f"{type(error).__name__}: {error}"
+            self._log.warning("the robot cannot be drawn", extra={"reason": reason})
 
     def _draw_robot(self, robot: RobotState) -> None:
         self._tool.visible = True

@@ -11,6 +11,7 @@ import viser
 
 from hmcs.task import ForbiddenRegion, Obstacle, Workspace
 from hmcs_console.drawing.geometry import box_edges, capsule, turn_to, wxyz
+from hmcs_console.drawing.nodes import node
 from hmcs_console.drawing.palette import FORBIDDEN, OBSTACLE, WORKSPACE
 
 _THICKNESS_M = 0.002
@@ -35,7 +36,7 @@ def draw_workspace(scene: viser.SceneApi, workspace: Workspace) -> None:
 
 
 def _draw_obstacle(scene: viser.SceneApi, obstacle: Obstacle) -> None:
-    name = f"/obstacles/{obstacle.name}"
+    name = node("obstacles", obstacle.name)
     turn, position = wxyz(obstacle.orientation_xyzw), obstacle.position_m
     if obstacle.size_m is not None:
         scene.add_box(name, OBSTACLE, obstacle.size_m, wxyz=turn, position=position)
@@ -48,7 +49,7 @@ def _draw_obstacle(scene: viser.SceneApi, obstacle: Obstacle) -> None:
 
 
 def _draw_region(scene: viser.SceneApi, region: ForbiddenRegion, size_m: float) -> None:
-    name, position = f"/forbidden/{region.name}", region.position_m
+    name, position = node("forbidden", region.name), region.position_m
     turn = wxyz(region.orientation_xyzw)
     if region.normal is not None:
         plate = (size_m, size_m, _THICKNESS_M)

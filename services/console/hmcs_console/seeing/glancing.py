@@ -22,6 +22,8 @@ M = TypeVar("M", bound=Message)
 
 EVERY_S = 0.03
 """How often is looked at what came meanwhile."""
+_LONGEST_BOOT = 64
+"""Characters, as in messages."""
 
 
 class Told(NamedTuple):
@@ -81,8 +83,19 @@ def told_in(payload: bytes) -> Told:
     """
     try:
         fields: Any = msgpack.unpackb(payload, use_list=False)
-        origin = fields["origin"]
-        cause = None if origin is None else (str(origin["boot"]), int(origin["seq"]))
-        return Told(str(fields["source"]["boot"]), cause)
+        sender, origin = fields["source"]["boot"], fields["origin"]
+        cause = None if origin is None else (origin["boot"], origin["seq"])
     except (ValueError, TypeError, LookupError, msgpack.UnpackException, RecursionError):
         return Told("", None)
+    if not _is_boot(sender) or not (cause is None or _is_cause(cause)):
+        return Told("", None)
+    return Told(sender, cause)
+
+
+def _is_boot(told: object) -> bool:
+    return isinstance(told, str) and len(told) <= _LONGEST_BOOT
+
+
+def _is_cause(told: tuple[object, object]) -> bool:
+    boot, seq = told
+    return _is_boot(boot) and isinstance(seq, int)

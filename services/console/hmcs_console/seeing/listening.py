@@ -6,14 +6,17 @@ import logging
 from collections.abc import Callable
 from functools import partial
 
-from hmcs.bus.keys import ANY
+from hmcs.bus.keys import ANY, KeyNameError, Member, check_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import Belief, Evidence, FixtureState, Motion, RobotState, Step
 from hmcs.bus.session import Bus, Received
 from hmcs_console.seeing.gathered import usable
 from hmcs_console.seeing.glancing import Glance
 from hmcs_console.seeing.hops import FAST, SLOW, cause_of
-from hmcs_console.seeing.seen import NS_PER_S, Seen
+from hmcs_console.seeing.seen import MOST_RECOGNIZERS, NS_PER_S, Seen
+
+MOST_STATES = 256
+"""Of one belief: no task has so many, and each is drawn."""
 
 
 class Listening:
@@ -27,7 +30,8 @@ class Listening:
         self._bus = bus
         self._seen = seen
         keys = bus.keys
-        loop, seldom = seen.in_fast_loop, Seldom(log)
+        self._seldom = seldom = Seldom(log)
+        loop = seen.in_fast_loop
         Glance(
             bus,
             Motion,
@@ -65,25 +69,53 @@ class Listening:
 
     def _on_belief(self, received: Received[Belief]) -> None:
         belief = received.body
-        if len(belief.states) != len(belief.probabilities):
-            self._bus.counters.count_refused(Belief.SCHEMA, "not one probability for each state")
+        name = self._recognizer_in(received.key, self._bus.keys.belief(ANY), Belief.SCHEMA)
+        if name is None:
             return
-        before, after = self._bus.keys.belief(ANY).split(ANY)
-        name = received.key.removeprefix(before).removesuffix(after)
         now_s = received.received_ns / NS_PER_S
-        self._seen.believed(now_s, name, belief)
+        wrong = wrong_with(belief)
+        if not wrong and not self._seen.admits(now_s, name):
+            wrong = f"{MOST_RECOGNIZERS} recognizers are heard already"
+        if wrong:
+            self._bus.counters.count_refused(Belief.SCHEMA, wrong)
+            return
+        source = received.envelope.source
+        self._seen.believed(now_s, name, belief, Member(source.service, source.instance))
         if name == self._seen.active(now_s):
             self._in_slow_loop("belief", received)
 
     def _on_evidence(self, received: Received[Evidence]) -> None:
+        name = self._recognizer_in(received.key, self._bus.keys.evidence(ANY), Evidence.SCHEMA)
+        if name is None:
+            return
         if not usable(received.body):
             self._bus.counters.count_refused(Evidence.SCHEMA, "its arrays do not fit one another")
             return
-        before, after = self._bus.keys.evidence(ANY).split(ANY)[:2]
-        name = received.key.removeprefix(before).split(after)[0]
         self._seen.evident(name, received.body)
+
+    def _recognizer_in(self, key: str, pattern: str, schema: str) -> str | None:
+        """The name that stands in a key, before the rest; one that is none is refused."""
+        before, after = pattern.split(ANY)[:2]
+        name = key.removeprefix(before).split(after)[0]
+        try:
+            return check_name("model", name)
+        except KeyNameError as error:
+            self._bus.counters.count_refused(schema, str(error))
+            self._seldom.warning("name", "no name of a recognizer", key=key, reason=str(error))
+            return None
 
     def _in_slow_loop(self, stage: str, received: Received[Step] | Received[Belief]) -> None:
         origin = received.envelope.origin
         if origin is not None:
             self._seen.in_slow_loop(SLOW.index(stage), cause_of(origin), received.received_ns)
+
+
+def wrong_with(belief: Belief) -> str:
+    """Return why a belief cannot be shown; empty where it can."""
+    if len(belief.states) != len(belief.probabilities):
+        return "not one probability for each state"
+    if len(set(belief.states)) < len(belief.states):
+        return "a state stands in it twice"
+    if len(belief.states) > MOST_STATES:
+        return f"it has more than {MOST_STATES} states"
+    return ""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -15,8 +17,15 @@ from hmcs.errors import UserError
 from hmcs.fixtures.rules import rules_of
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
+from hmcs.shown import plain
 from hmcs.task import Task, load_task
 from hmcs_console.drawing.geometry import Surface, tube
+
+MOST_MODELS, MOST_TOLD, MOST_MISSED = 256, 16, 256
+"""Models that are kept, files that others told of, and hashes of which no file was found."""
+READ_EVERY_S = 2.0
+"""How often files are looked at for a model that is not known."""
+_LONGEST_PATH = 4096
 
 
 class Guide(NamedTuple):
@@ -78,19 +87,27 @@ class Models:
     """
 
     def __init__(
-        self, models: Sequence[Model], places: Iterable[Path], log: logging.Logger
+        self,
+        models: Sequence[Model],
+        places: Iterable[Path],
+        log: logging.Logger,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Begin with some; `places` are files and folders where others may come to be."""
         self._log = log
+        self._clock = clock
         self._named = {model.name: model for model in models}
         self._hashed = {model.hash: model for model in models}
-        self._places = dict.fromkeys(places)
-        self._missed: set[str] = set()
+        self._places = tuple(places)
+        self._told: deque[Path] = deque(maxlen=MOST_TOLD)
+        self._missed: deque[str] = deque(maxlen=MOST_MISSED)
+        self._read_s = -READ_EVERY_S
 
-    def look_in(self, place: Path) -> None:
-        """Look in a file, too, which was written just now."""
-        self._places[place] = None
-        self._missed.clear()
+    def look_in(self, told: str) -> None:
+        """Look in a file, too, which somebody says was written just now."""
+        if plain(told, _LONGEST_PATH) == told and told.endswith(".hmcs"):
+            self._told.append(Path(told))
+            self._missed.clear()
 
     def find(self, recognizer: str, model_hash: str) -> Model | None:
         """Return the model a recognizer stands on, by its hash; None where it is not known here.
@@ -100,21 +117,30 @@ class Models:
         """
         if not model_hash:
             return self._named.get(recognizer)
-        if model_hash not in self._hashed and model_hash not in self._missed:
-            self._read_files()
-            if model_hash not in self._hashed:
-                self._missed.add(model_hash)
-                self._log.info(
-                    "no file of this model is seen here: its guides are not drawn",
-                    extra={"recognizer": recognizer, "hash": model_hash},
-                )
+        known = self._hashed.get(model_hash)
+        if known is not None or model_hash in self._missed:
+            return known
+        # Whoever tells of ever new models has no file read more often for it.
+        if self._clock() - self._read_s < READ_EVERY_S:
+            return None
+        self._read_s = self._clock()
+        self._read_files()
+        if model_hash not in self._hashed:
+            self._missed.append(model_hash)
+            self._log.info(
+                "no file of this model is seen here: its guides are not drawn",
+                extra={"recognizer": recognizer, "hash": model_hash},
+            )
         return self._hashed.get(model_hash)
 
     def _read_files(self) -> None:
-        for place in self._places:
+        for place in (*self._places, *self._told):
             # Paths are told as another process sees them, and files may be half written.
-            with suppress(UserError, OSError):
+            with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):
                 for file in model_files(place):
-                    with suppress(UserError, OSError):
-                        model = load_model(file)
-                        self._named[model.name] = self._hashed[model.hash] = model
+                    with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):
+                        self._take(load_model(file))
+
+    def _take(self, model: Model) -> None:
+        if len(self._hashed) < MOST_MODELS:
+            self._named[model.name] = self._hashed[model.hash] = model

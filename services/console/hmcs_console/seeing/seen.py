@@ -23,6 +23,7 @@ from hmcs_console.drawing.pieces import Pieces
 from hmcs_console.seeing.gathered import Gathered, beneath, gathered
 from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
+from hmcs_console.seeing.runners import Runners
 from hmcs_console.seeing.shadows import Agreement, Shadows
 from hmcs_console.seeing.trails import Points, Trail
 from hmcs_console.teaching.marking import Marking
@@ -33,6 +34,11 @@ T = TypeVar("T")
 NS_PER_S = 1_000_000_000
 FORGOTTEN_S = 2.0
 """What was not said again for so long is not shown as what is."""
+UNRUN_AFTER_S = 1.0
+"""A recognizer that nobody has run for so long is told as such; a swap has no such gap."""
+MOST_RECOGNIZERS = 32
+"""That are heard at once; another is refused until one of those is silent and run by nobody."""
+_SILENT_S = 30.0
 
 
 class Picture(NamedTuple):
@@ -72,6 +78,8 @@ class Picture(NamedTuple):
     """How far a newcomer among the recognizers is; empty where there is none."""
     take: Take = Take()
     """What is shown of a recording."""
+    unrun: str = ""
+    """Name of the recognizer that is followed where no process runs it; else empty."""
 
 
 class Seen:
@@ -97,6 +105,10 @@ class Seen:
         self._evidence: dict[str, Gathered] = {}
         self._fast, self._slow = Arrivals(FAST), Arrivals(SLOW)
         self._shadows = Shadows()
+        self.runners = Runners()
+        """Who works for which model."""
+        self._followed_run = ("", 0.0)
+        """Which recognizer is followed, and when somebody was seen to run it, s."""
         self._robot_trail, self._hand_trail = Trail(), Trail()
         self._hand_offset: Points | None = None
 
@@ -122,16 +134,41 @@ class Seen:
             self._hand_offset = self._robot[1].tool_position - motion.position
         self._hand_trail.add(motion.position + self._hand_offset, self._color())
 
-    def believed(self, now_s: float, recognizer: str, belief: Belief) -> None:
-        """Take in what a recognizer holds true."""
+    def admits(self, now_s: float, recognizer: str) -> bool:
+        """Whether what a recognizer says is taken in; one that is not heard any more gives way."""
+        if recognizer in self._beliefs or len(self._beliefs) < MOST_RECOGNIZERS:
+            return True
+        active = self.active(now_s)
+        silent = [
+            name
+            for name, (said_s, _) in self._beliefs.items()
+            if now_s - said_s > _SILENT_S
+            and name != active
+            and not self.runners.run(name, self.members)
+        ]
+        for name in silent:
+            del self._beliefs[name]
+            self._evidence.pop(name, None)
+            self.forget(name)
+            self.runners.forget(name)
+        return bool(silent)
+
+    def believed(
+        self, now_s: float, recognizer: str, belief: Belief, by: Member | None = None
+    ) -> None:
+        """Take in what a recognizer that is admitted holds true, as a process says."""
         self._beliefs[recognizer] = now_s, belief
+        if by is not None:
+            self.runners.spoke(recognizer, by)
         if belief.states:
             self._shadows.heard(recognizer, belief.clock, belief.step, belief.likely_state)
         if not self.states:
             self.states = belief.states
 
     def evident(self, recognizer: str, evidence: Evidence) -> None:
-        """Take in what a classifier makes of a step."""
+        """Take in what a classifier makes of a step, for a recognizer that is heard."""
+        if recognizer not in self._beliefs and len(self._evidence) >= MOST_RECOGNIZERS:
+            return
         known = self._evidence.get(recognizer, Gathered())
         self._evidence[recognizer] = gathered(known, evidence)
 
@@ -157,6 +194,13 @@ class Seen:
     def forget(self, recognizer: str) -> None:
         """Compare a recognizer by what it says from now on."""
         self._shadows.forget(recognizer)
+
+    def unrun(self, now_s: float) -> str:
+        """Return the recognizer that is followed where nobody runs it; else nothing."""
+        active = self.active(now_s)
+        if active != self._followed_run[0] or self.runners.run(active, self.members):
+            self._followed_run = active, now_s
+        return active if now_s - self._followed_run[1] >= UNRUN_AFTER_S else ""
 
     def write_down(self, now_s: float) -> None:
         """Add a row to the history."""
@@ -188,6 +232,7 @@ class Seen:
             operator=operator,
             operating_client=client,
             takeover=self.takeover,
+            unrun=self.unrun(now_s),
         )
 
     def _numbers(self, now_s: float) -> dict[str, float]:

@@ -1,74 +1,144 @@
-"""The door of the page: judges the first request of each connection, then hands bytes through.
+"""The door of the page: answers what is asked for over HTTP, and hands WebSockets through.
 
-The page itself listens at a loopback port nobody is told of. It closes a connection after one
-answer unless that becomes a WebSocket, so judging the first request judges all.
+The page's own server listens at a loopback port nobody is told of, and hears nothing but requests
+made here and messages that were read here.
 
-A browser that sends more than any hand makes it send is sent away. To slow it down would be worse:
-what its operator did last would wait behind all of that, and letting go with it.
+A browser that sends more than any hand makes it send, or what no page says, is sent away. To slow
+it down would be worse: what its operator did last would wait behind all of that, and letting go
+with it.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import ssl
 import threading
+from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from hmcs.bus.logs import Seldom
 from hmcs.bus.service import UserError
-from hmcs_console.serving.admission import admit, head_of
+from hmcs_console.serving.admission import Admission, Head, head_of
+from hmcs_console.serving.answers import (
+    answer,
+    asks_for_socket,
+    document_for,
+    request_for_socket,
+    wrong_with_socket,
+)
+from hmcs_console.serving.document import load_document
+from hmcs_console.serving.frames import Incoming
+from hmcs_console.serving.places import doors, is_loopback
+from hmcs_console.serving.said_by_pages import HostileError
 
+MOST_CONNECTIONS = 64
+MOST_OF_AN_ADDRESS = 48
+"""Connections, so that one that opens all it can leaves some for others."""
+MOST_PAGES = 16
+"""That are open at once."""
 _HEAD_BYTES = 65_536
 _HEAD_WITHIN_S = 10.0
+_ENCRYPTED_WITHIN_S = 5.0
+_READ_WITHIN_S = 20.0
+"""A browser that has not read for so long is gone."""
 _CHUNK_BYTES = 65_536
 _PORTS_TRIED = 100
-MOST_BYTES_A_S = 400_000
-"""From one browser; one whose handle is dragged while the camera turns sends a tenth of that."""
+_COOKIE = "hmcs_console_{port}"
+"""By port: a browser sends cookies of a host to all of its ports."""
+
+
+class Served(NamedTuple):
+    """Where the page is served, and to whom."""
+
+    host: str
+    port: int
+    """0 for any free one; the next free one where it is taken."""
+    token: str | None = None
+    """None lets in everybody who can reach a loopback address."""
+    names: tuple[str, ...] = ()
+    """The page is known under, beside its addresses."""
+    encryption: ssl.SSLContext | None = None
+    """None where connections are not encrypted."""
 
 
 class Gateway:
-    """Serves the page at a host and a port; `port` is the one that was free."""
+    """Serves the page; `port` is the one that was free."""
 
     def __init__(
-        self, host: str, port: int, page_port: int, token: str | None, log: logging.Logger
+        self, served: Served, page_port: int, log: logging.Logger, refused: Callable[[str], None]
     ) -> None:
-        """Open the door to the page at loopback `page_port`.
+        """Open the door to the page's server at loopback `page_port`; count in `refused` why not.
 
-        Raises UserError where neither `port` nor one of those after it can be listened at.
+        Raises UserError where neither the port nor one of those after it can be listened at, and
+        where others could reach a page without a token.
         """
+        self._served = served
         self._page_port = page_port
-        self._token = token
+        self._refused = refused
         self._seldom = Seldom(log)
+        self._document = load_document()
+        self._connections: Counter[str] = Counter()
+        self._pages = 0
         self._loop = asyncio.new_event_loop()
+        self._loop.set_exception_handler(self._failed)
         self._thread = threading.Thread(target=self._loop.run_forever, name="gateway", daemon=True)
         self._thread.start()
         try:
-            self._server = asyncio.run_coroutine_threadsafe(
-                self._listen(host, port), self._loop
-            ).result()
+            self._server = self._await(self._listen())
         except OSError as error:
             self._stop_loop()
             raise UserError(
-                f"the page cannot be served at {host}:{port}: {error.strerror}: "
+                f"the page cannot be served at {served.host}:{served.port}: {error.strerror}: "
                 "give another host or port"
             ) from error
-        self.port: int = self._server.sockets[0].getsockname()[1]
+        at = [listening.getsockname() for listening in self._server.sockets]
+        self.port: int = at[0][1]
+        addresses = [address[0] for address in at]
+        self._admission = Admission(
+            doors(served.host, addresses, served.names),
+            served.token,
+            cookie=_COOKIE.format(port=self.port),
+            secure=served.encryption is not None,
+        )
+        if served.token is None and not all(map(is_loopback, addresses)):
+            self.close()
+            raise UserError(
+                f"host {served.host} is {', '.join(addresses)} here, which can be reached from "
+                "other machines: give a token, or a loopback host"
+            )
+        self._await(self._open())
 
     def close(self) -> None:
         """Shut it, with all that is open."""
-        asyncio.run_coroutine_threadsafe(self._shut(), self._loop).result()
+        self._await(self._shut())
         self._stop_loop()
 
-    async def _listen(self, host: str, port: int) -> asyncio.Server:
+    def _await(self, doing: Any) -> Any:
+        return asyncio.run_coroutine_threadsafe(doing, self._loop).result()
+
+    async def _listen(self) -> asyncio.Server:
+        host, port = self._served.host, self._served.port
         tried = [port] if port == 0 else range(port, min(port + _PORTS_TRIED, 65_536))
         for candidate in tried:
             try:
                 return await asyncio.start_server(
-                    self._serve, host, candidate, limit=_HEAD_BYTES, reuse_address=True
+                    self._serve,
+                    host,
+                    candidate,
+                    limit=_HEAD_BYTES,
+                    reuse_address=True,
+                    start_serving=False,
                 )
             except OSError as error:
                 failure = error
         raise failure
+
+    async def _open(self) -> None:
+        await self._server.start_serving()
 
     async def _shut(self) -> None:
         self._server.close()
@@ -82,27 +152,83 @@ class Gateway:
         self._thread.join()
         self._loop.close()
 
+    def _failed(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error = context.get("exception")
+        reason = f"{context['message']}: {type(error).__name__}: {error}"
+        self._seldom.warning("failure", "a connection failed", reason=reason)
+
+    # --- connections ------------------------------------------------------------------------------
+
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        address = str((writer.get_extra_info("peername") or ("nowhere",))[0])
+        crowded = self._connections.total() >= MOST_CONNECTIONS
+        if crowded or self._connections[address] >= MOST_OF_AN_ADDRESS:
+            self._turn_away("connections", "a connection is closed", address, "there are too many")
+            writer.transport.abort()
+            return
+        self._connections[address] += 1
         # Streams print a traceback of a task that ends as canceled.
         ended = (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError, asyncio.CancelledError)
-        with suppress(*ended):
-            try:
-                async with asyncio.timeout(_HEAD_WITHIN_S):
-                    head = await reader.readuntil(b"\r\n\r\n")
-                answer = admit(head_of(head), self._token).answer
-                if answer is not None:
-                    writer.write(answer)
-                    await writer.drain()
-                    return
-                await self._hand_through(head, reader, writer)
-            finally:
-                writer.close()
+        try:
+            with suppress(*ended):
+                await self._converse(reader, writer, address)
+        except HostileError as error:
+            # Closed without a word: the page's server may be in the middle of one.
+            writer.transport.abort()
+            self._turn_away("frames", "a browser is sent away", address, str(error))
+        finally:
+            with suppress(*ended):
+                await _close(writer)
+            self._connections[address] -= 1
+            if not self._connections[address]:
+                del self._connections[address]
+
+    async def _converse(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: str
+    ) -> None:
+        if self._served.encryption is not None:
+            await writer.start_tls(
+                self._served.encryption, ssl_handshake_timeout=_ENCRYPTED_WITHIN_S
+            )
+        try:
+            async with asyncio.timeout(_HEAD_WITHIN_S):
+                head = head_of(await reader.readuntil(b"\r\n\r\n"))
+        except asyncio.LimitOverrunError:
+            await _send(writer, answer(431, f"a request's head has at most {_HEAD_BYTES} bytes"))
+            return
+        verdict = self._admission.judge(head, address, self._loop.time())
+        if verdict.status is not None or head is None:
+            if verdict.wrong_tokens:
+                told = f"wrong token number {verdict.wrong_tokens} of its address"
+                self._turn_away("token", "a browser is not let in", address, told)
+            status = verdict.status or 400
+            await _send(writer, answer(status, verdict.reason, verdict.headers))
+        elif asks_for_socket(head):
+            await self._open_page(head, reader, writer, address)
+        else:
+            await _send(writer, document_for(head, self._document))
+
+    async def _open_page(
+        self, head: Head, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: str
+    ) -> None:
+        wrong, status = wrong_with_socket(head), 400
+        if not wrong and self._pages >= MOST_PAGES:
+            wrong, status = f"{MOST_PAGES} pages are open already: close one", 503
+        if wrong:
+            self._turn_away("page", "a page is not opened", address, wrong)
+            await _send(writer, answer(status, wrong))
+            return
+        self._pages += 1
+        try:
+            await self._hand_through(head, reader, writer)
+        finally:
+            self._pages -= 1
 
     async def _hand_through(
-        self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+        self, head: Head, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
         page_reader, page_writer = await asyncio.open_connection("127.0.0.1", self._page_port)
-        page_writer.write(head)
+        page_writer.write(request_for_socket(head, self._page_port))
         ways = [
             asyncio.ensure_future(self._pipe_in(reader, page_writer)),
             asyncio.ensure_future(_pipe(page_reader, writer)),
@@ -113,24 +239,64 @@ class Gateway:
         finally:
             for way in ways:
                 way.cancel()
-            await asyncio.gather(*ways, return_exceptions=True)
+            came = await asyncio.gather(*ways, return_exceptions=True)
             page_writer.close()
+        for failure in came:
+            if isinstance(failure, HostileError):
+                raise failure
 
     async def _pipe_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        began_s, count = self._loop.time(), 0
+        incoming = Incoming(self._loop.time, self._left_out)
         while data := await reader.read(_CHUNK_BYTES):
-            now_s = self._loop.time()
-            if now_s - began_s >= 1.0:
-                began_s, count = now_s, 0
-            count += len(data)
-            if count > MOST_BYTES_A_S:
-                self._seldom.warning("flood", "a browser sends too much: sent away", bytes=count)
-                return
-            writer.write(data)
-            await writer.drain()
+            await _send(writer, incoming.take(data))
+
+    def _left_out(self, reason: str) -> None:
+        self._refused(reason)
+        self._seldom.warning("nonsense", "a message of a browser is left out", reason=reason)
+
+    def _turn_away(self, kind: str, event: str, address: str, reason: str) -> None:
+        self._refused(event)
+        self._seldom.warning(kind, event, address=address, reason=reason)
 
 
 async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     while data := await reader.read(_CHUNK_BYTES):
-        writer.write(data)
+        await _send(writer, data)
+
+
+async def _send(writer: asyncio.StreamWriter, data: bytes) -> None:
+    """Send; raises TimeoutError where whoever should read it does not."""
+    writer.write(data)
+    async with asyncio.timeout(_READ_WITHIN_S):
         await writer.drain()
+
+
+async def _close(writer: asyncio.StreamWriter) -> None:
+    """Close, after what is still to be sent; whoever does not read it in time is cut off."""
+    writer.close()
+    try:
+        async with asyncio.timeout(_READ_WITHIN_S):
+            await writer.wait_closed()
+    finally:
+        writer.transport.abort()
+
+
+def encryption(certificate: Path, key: Path) -> ssl.SSLContext:
+    """Return how connections are encrypted, by files of a certificate and of its key.
+
+    Raises UserError where one of them cannot be used.
+    """
+
+    def no_password() -> str:
+        raise UserError(f"the key in {key} asks for a password: give one without")
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(certificate, key, password=no_password)
+    except (OSError, ssl.SSLError) as error:
+        raise UserError(
+            f"the page cannot be served with certificate {certificate} and key {key}: "
+            f"{error.strerror or error}: give PEM files of a certificate and its key"
+        ) from error
+    return context

@@ -7,10 +7,9 @@ Everything a viewer does is put down as an event with its time, for the bus' thr
 from __future__ import annotations
 
 import contextlib
-import io
+import logging
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -39,35 +38,21 @@ from hmcs_console.operating.rules import (
     rule_of,
 )
 from hmcs_console.serving.inbox import Inbox, Press, Taken
+from hmcs_console.serving.server import Server
+from hmcs_console.serving.writing import notify
 
 _PULSE_S = 0.05
+_NOTICE_S = 4.0
 _PEDAL_HZ = 10.0
 _HANDLE = "/handle"
-
-
-class Server(viser.ViserServer):
-    """A viser server that nobody can make reach beyond this machine."""
-
-    def __init__(self) -> None:
-        with _quietly():
-            super().__init__(host="127.0.0.1", port=0, label="HMCS", verbose=False)
-
-    def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse: a tunnel would let strangers move the robot."""
-        return None
-
-    def stop(self) -> None:
-        """End, with all its threads."""
-        with _quietly():
-            super().stop()
 
 
 class Page:
     """Serves the page, and keeps what its viewers did until `take_events`."""
 
-    def __init__(self, handle_at: NDArray[np.float64], lease_s: float) -> None:
+    def __init__(self, handle_at: NDArray[np.float64], lease_s: float, log: logging.Logger) -> None:
         """Begin with handles at a position, m, base frame, shape (3,)."""
-        self.server = Server()
+        self.server = Server(log)
         self._handle_at = handle_at
         self._lease_s = lease_s
         self._inbox = Inbox()
@@ -129,7 +114,7 @@ class Page:
         """Tell one viewer something."""
         viewer = self.server.get_clients().get(client)
         if viewer is not None:
-            viewer.add_notification("Operating", text, auto_close_seconds=4.0, color="orange")
+            notify(viewer, text, seconds=_NOTICE_S)
 
     def close(self) -> None:
         """Send everybody away."""
@@ -235,10 +220,3 @@ class Page:
                     client.local_storage.get_item("alive", timeout=self._lease_s)
                     self.put(Alive(number, time.monotonic()))
             time.sleep(_PULSE_S)
-
-
-@contextlib.contextmanager
-def _quietly() -> Iterator[None]:
-    # The library greets and takes its leave on standard output, where it has no business.
-    with contextlib.redirect_stdout(io.StringIO()):
-        yield

@@ -10,10 +10,12 @@ import math
 from typing import Literal, NamedTuple
 
 from hmcs.bus.messages import LoadModel, TrainingProgress
+from hmcs.shown import Markdown
 from hmcs_console.seeing.shadows import Agreement
 from hmcs_console.teaching.wishes import Question, activate
 
 Stage = Literal["loading", "comparing", "activating", "done", "failed"]
+_LINES = Markdown("  \n")
 UNDER_WAY: tuple[Stage, ...] = ("loading", "comparing", "activating")
 
 
@@ -126,27 +128,30 @@ def followed(known: Followed, active: str) -> Followed:
     return known if active in ("", known.now) else Followed(active, known.now)
 
 
-def said(takeover: Takeover | None, now_s: float) -> str:
+def said(takeover: Takeover | None, now_s: float) -> Markdown:
     """Return how far a newcomer is, in words; nothing where there is none."""
     if takeover is None:
-        return ""
-    name, before = f"**{takeover.model}**", takeover.before
+        return Markdown("")
+    name, before = Markdown("**{}**").format(takeover.model), takeover.before
     match takeover.stage:
         case "loading":
-            return f"{name} is being loaded …"
+            return Markdown("{} is being loaded …").format(name)
         case "comparing":
             left_s = math.ceil(max(takeover.until_s - now_s, 0.0))
-            how = f"{_agreed(takeover)}, active in {left_s} s"
-            return "  \n".join([f"{name} runs beside {before}: {how}", *takeover.loaded])
+            told = Markdown("{} runs beside {}: {}, active in {} s")
+            told = told.format(name, before, _agreed(takeover), left_s)
+            return _LINES.join([told, *takeover.loaded])
         case "activating":
-            return f"{name} is being activated …"
+            return Markdown("{} is being activated …").format(name)
         case "done":
-            compared = f"  \nbeside {before}: {_agreed(takeover)}" if before else ""
-            told = [f"{name} took over: {takeover.detail}{compared}", *takeover.loaded]
-            return "  \n".join(told)
+            lines = [Markdown("{} took over: {}").format(name, takeover.detail)]
+            if before:
+                lines.append(Markdown("beside {}: {}").format(before, _agreed(takeover)))
+            return _LINES.join([*lines, *takeover.loaded])
         case "failed":
-            still = f", {before} is active still" if before else ""
-            return f"{name} did not take over{still}: {takeover.detail}"
+            still = Markdown(", {} is active still" if before else "").format(before)
+            told = Markdown("{} did not take over{}: {}")
+            return told.format(name, still, takeover.detail)
 
 
 def _agreed(takeover: Takeover) -> str:

@@ -29,6 +29,10 @@ from hmcs_console.drawing.pieces import Pieces
 Array = NDArray[np.float64]
 
 CHOSEN: Color = (60, 60, 60)
+MOST = 1e7
+"""Seconds, and meters, that no recording has."""
+MOST_STATES = 100
+"""That labels of a recording name; each is drawn."""
 _WHILE_S = 0.2
 
 
@@ -62,6 +66,11 @@ def opened(take: Take, outline: Outline) -> Take:
     """
     if len(outline.time_s) != len(outline.position):
         raise LabelError(f"{outline.recording}: not a position for each time in its outline")
+    numbers = (outline.time_s, outline.begin_s, outline.end_s, outline.position.ravel())
+    if outline.duration_s > MOST or any(np.abs(each).max(initial=0.0) > MOST for each in numbers):
+        raise LabelError(f"{outline.recording}: times and positions of no recording")
+    if len(set(outline.states)) > MOST_STATES:
+        raise LabelError(f"{outline.recording}: its labels name more than {MOST_STATES} states")
     labels = of_seconds(outline.begin_s.tolist(), outline.end_s.tolist(), outline.states)
     again = take.name == outline.recording
     return take._replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,14 +10,14 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
+from hmcs.shown import Markdown
 from hmcs_console.drawing.palette import FASTER, css
 from hmcs_console.drawing.pieces import add_pieces, draw_pieces
 from hmcs_console.seeing.history import limits
 from hmcs_console.serving.buttons import on_change, on_click
+from hmcs_console.serving.writing import Choice, add_words, name_of_curve, write
 from hmcs_console.teaching.takes import CHOSEN, Take, band_color, bands, lines, states_of
 
-NONE = "(none)"
-"""What a list says while nothing is in it, or nothing of it is chosen."""
 _HEIGHT_PX = 190
 _SLIDER_STEPS = 1000
 _TRANSPARENT = "66"
@@ -61,13 +61,13 @@ class Timeline:
         self._series: tuple[str, ...] = ()
         self._plot: viser.GuiUplotHandle | None = None
         self._slider: viser.GuiMultiSliderHandle[float] | None = None
-        self._choice = gui.add_dropdown("Recording", (NONE,))
-        on_change(self._choice, self._open)
+        self._choice = Choice(gui, "Recording")
+        self._choice.on_choice(editing.open)
         on_click(gui.add_button("Refresh", hint="Look what there is now"), editing.refresh)
         self._shown = gui.add_folder("Labels", visible=False)
         with self._shown:
-            self._chosen = gui.add_markdown("", order=6.0)
-            self._state = gui.add_dropdown("State", (NONE,), order=10.0)
+            self._chosen = add_words(gui, order=6.0)
+            self._state = Choice(gui, "State", order=10.0)
             label = gui.add_button("Label", order=11.0, hint="The chosen stretch is this state")
             on_click(label, self._label)
             remove = gui.add_button("Remove", order=12.0, hint="The chosen stretch is no state")
@@ -77,7 +77,7 @@ class Timeline:
             use = gui.add_button("Use for training", order=14.0)
             on_click(use, lambda: use_for_training(self._drawn[0].path))
             on_click(gui.add_button("Hide", order=15.0), editing.hide)
-        self._said = gui.add_markdown("")
+        self._said = add_words(gui)
 
     def draw(self, take: Take, states: tuple[str, ...]) -> None:
         """Draw what is shown of a recording, with the states of the task."""
@@ -85,33 +85,28 @@ class Timeline:
         if take is before and states == states_before:
             return
         self._drawn = take, states
-        if take.said != before.said:
-            self._said.content = take.said
-        options = take.recordings or (NONE,)
-        if not take.name:
-            options = (NONE, *take.recordings)
-        if options != self._choice.options:
-            self._choice.options = options
-        self._choice.value = take.name or NONE  # type: ignore[misc]
+        write(self._said, take.said)
+        self._choice.offer(take.recordings, none_too=not take.name)
+        self._choice.choose(take.name)
         self._shown.visible = bool(take.name)
         if not take.name:
             return
         named = states_of(take, states)
-        if (named or (NONE,)) != self._state.options:
-            self._state.options = named or (NONE,)
+        self._state.offer(named, none_too=False)
         if self._slider is None or (take.name, take.duration_s) != (before.name, before.duration_s):
             self._make_slider(take)
         if take.chosen_s != before.chosen_s:
-            self._chosen.content = "Chosen: {:.2f} s to {:.2f} s".format(*take.chosen_s)
+            write(self._chosen, Markdown("Chosen: {:.2f} s to {:.2f} s").format(*take.chosen_s))
         self._draw_bands(take, named, states)
 
-    def _open(self, name: str) -> None:
-        if name != NONE:
-            self._editing.open(name)
-
     def _label(self) -> None:
-        if self._state.value != NONE:
-            self._editing.label(self._state.value)
+        if self._state.chosen:
+            self._editing.label(self._state.chosen)
+
+    def _choose(self, chosen: Sequence[float]) -> None:
+        # A page may say anything.
+        if len(chosen) == 2 and np.all(np.isfinite(chosen)):
+            self._editing.choose(min(chosen), max(chosen))
 
     def _make_slider(self, take: Take) -> None:
         """Its ends cannot be moved while it is there, where pages hold it."""
@@ -126,7 +121,7 @@ class Timeline:
                 initial_value=take.chosen_s,
                 order=5.0,
             )
-        on_change(self._slider, lambda chosen: self._editing.choose(*sorted(chosen)))
+        on_change(self._slider, self._choose)
 
     def _draw_bands(self, take: Take, named: tuple[str, ...], states: tuple[str, ...]) -> None:
         data = bands(take, named)
@@ -147,7 +142,9 @@ class Timeline:
             uplot.Series(label="chosen", width=0, fill=css(CHOSEN) + _TRANSPARENT),
             *(
                 uplot.Series(
-                    label=state, width=0, fill=css(band_color(state, states)) + _TRANSPARENT
+                    label=name_of_curve(state),
+                    width=0,
+                    fill=css(band_color(state, states)) + _TRANSPARENT,
                 )
                 for state in named
             ),

@@ -9,9 +9,9 @@ import viser
 from hmcs.motion.paths import Path
 from hmcs.recognition.model import Model
 from hmcs_console.seeing.seen import Picture
+from hmcs_console.serving.writing import add_words, write
 from hmcs_console.telling import spoken_reasons, spoken_rules
 from hmcs_console.telling.reasons import reasons_of
-from hmcs_console.telling.writing import write
 
 _LAST = 1e9
 """In what order it stands among all in its container."""
@@ -25,9 +25,9 @@ class Explained:
     ) -> None:
         with reasons:
             # Below what is pressed there: its height changes.
-            self._reasons = gui.add_markdown("", order=_LAST)
+            self._reasons = add_words(gui, order=_LAST)
         with rules:
-            self._rules = gui.add_markdown("")
+            self._rules = add_words(gui)
         self._model: Model | None = None
         self._paths: Mapping[str, Path] = {}
 

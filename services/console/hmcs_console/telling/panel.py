@@ -6,17 +6,18 @@ from typing import Any, Protocol
 
 import viser
 
+from hmcs.shown import plain
 from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.buttons import on_change, on_click
 from hmcs_console.serving.inbox import pressed_by
+from hmcs_console.serving.writing import Choice, add_words, write
 from hmcs_console.teaching import wishes
 from hmcs_console.teaching.timeline import Editing, Timeline
 from hmcs_console.teaching.wishes import Question
 from hmcs_console.telling import words
 from hmcs_console.telling.plots import Plots
-from hmcs_console.telling.writing import write
 
-_NO_LABEL = "(none)"
+_LONGEST_PATH = 4096
 
 
 class Wishes(Protocol):
@@ -66,21 +67,21 @@ class Panel:
         self._states = states
         stop = gui.add_button("Stop", color="red", hint="Every robot stands, whoever drives it")
         on_click(stop, carried_out_by.stop)
-        self._answer = gui.add_markdown("")
+        self._answer = add_words(gui)
         tabs = gui.add_tab_group()
         self.operating = tabs.add_tab("Operate")
         with self.operating:
             with gui.add_folder("How to engage, clutch and stop", expand_by_default=False):
-                gui.add_markdown(words.operating())
-            self._operator = gui.add_markdown(words.operates(""))
-            self._doing = gui.add_markdown("")
-            self._why = gui.add_markdown(words.why(None))
+                add_words(gui, words.operating())
+            self._operator = add_words(gui, words.operates(""))
+            self._doing = add_words(gui)
+            self._why = add_words(gui, words.why(None))
         self._plots_tab = tabs.add_tab("Plots")
         with self._plots_tab:
             self._plots = Plots(gui, states)
         with tabs.add_tab("Recognizers"):
-            self._recognizers = gui.add_markdown("")
-            self._choice = gui.add_dropdown("Recognizer", (_NO_LABEL,))
+            self._recognizers = add_words(gui)
+            self._choice = Choice(gui, "Recognizer")
             on_click(gui.add_button("Activate"), self._activate)
             back = gui.add_button("Back", hint="To the one that was active before")
             on_click(back, carried_out_by.back)
@@ -90,7 +91,7 @@ class Panel:
         with tabs.add_tab("Recordings"):
             self._timeline = Timeline(gui, carried_out_by.recordings, self._use_for_training)
         with tabs.add_tab("Services"):
-            self._services = gui.add_markdown("")
+            self._services = add_words(gui)
 
     def draw(self, picture: Picture) -> None:
         """Write down a moment."""
@@ -98,8 +99,10 @@ class Panel:
         write(self._operator, words.operates(picture.operator))
         write(self._doing, words.doing(picture.fixture, picture.robot))
         write(self._why, words.why(picture.belief))
-        write(self._recognizers, words.recognizers(picture.active, picture.agreement))
-        write(self._services, words.services(picture.health))
+        nobody = bool(picture.unrun)
+        told = words.recognizers(picture.active, picture.agreement, nobody_runs_it=nobody)
+        write(self._recognizers, told)
+        write(self._services, words.services(picture.health, picture.unrun))
         write(self._training, words.training(picture.training))
         write(self._marking, words.marking(picture.marking))
         write(self._answer, picture.answer)
@@ -116,14 +119,14 @@ class Panel:
             name = gui.add_text("Name", "", hint="By date and time where it is empty")
             record = gui.add_button_group("Recording", ("Begin", "End"))
         with gui.add_folder("Label"):
-            self._label = gui.add_dropdown("State", (_NO_LABEL, *self._states))
+            self._label = Choice(gui, "State", self._states)
             on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
             pedal = gui.add_checkbox(
                 "Pedal begins the next part",
                 self._wishes.marks_by_pedal,
                 hint="Press it where each part begins, and once more where the last one ends",
             )
-            self._marking = gui.add_markdown("")
+            self._marking = add_words(gui)
         with gui.add_folder("Train"):
             model = gui.add_text("Model", "taught")
             task_name = gui.add_text("Task", task)
@@ -133,7 +136,7 @@ class Panel:
             train = gui.add_button("Train")
             on_click(gui.add_button("Cancel"), lambda: self._wishes.ask(wishes.cancel()))
             self._progress = gui.add_progress_bar(0.0)
-            self._training = gui.add_markdown("")
+            self._training = add_words(gui)
             on_click(
                 gui.add_button(
                     "Activate what was trained",
@@ -145,7 +148,7 @@ class Panel:
                 gui.add_button("Activate now", hint="Without comparing it any longer"),
                 self._wishes.activate_now,
             )
-            self._takeover = gui.add_markdown("")
+            self._takeover = add_words(gui)
 
         async def change_recording(event: viser.GuiEvent[Any]) -> None:
             with pressed_by(event.client_id):
@@ -171,13 +174,16 @@ class Panel:
         on_click(train, ask_to_train)
 
     def _mark(self) -> None:
-        self._wishes.label("" if self._label.value == _NO_LABEL else self._label.value)
+        self._wishes.label(self._label.chosen)
 
     def _activate(self) -> None:
-        if self._choice.value != _NO_LABEL:
-            self._wishes.ask(wishes.activate(self._choice.value))
+        if self._choice.chosen:
+            self._wishes.ask(wishes.activate(self._choice.chosen))
 
     def _use_for_training(self, path: str) -> None:
+        if plain(path, _LONGEST_PATH) != path:
+            self._wishes.refuse("a recording whose path cannot be shown is not trained from")
+            return
         there = [file for file in self._files.value.split(", ") if file]
         if path and path not in there:
             self._files.value = ", ".join([*there, path])  # type: ignore[misc]
@@ -187,11 +193,11 @@ class Panel:
         if states == self._states:
             return
         self._states = states
-        self._label.options = (_NO_LABEL, *states)
+        self._label.offer(states, none_too=True)
         self._plots.remove()
         with self._plots_tab:
             self._plots = Plots(self._gui, states)
 
     def _offer(self, recognizers: tuple[str, ...]) -> None:
-        if recognizers and recognizers != self._choice.options:
-            self._choice.options = recognizers
+        if recognizers:
+            self._choice.offer(recognizers, none_too=False)

@@ -20,6 +20,7 @@ from hmcs_console.drawing.palette import (
 )
 from hmcs_console.seeing.history import SPAN_S, Rows, columns, limits
 from hmcs_console.seeing.hops import FAST, SLOW, hop_names
+from hmcs_console.serving.writing import name_of_curve
 
 _HEIGHT_PX = 170
 _SHARE = (0.0, 1.05)
@@ -77,7 +78,7 @@ class _Plot:
         series: tuple[uplot.Series, ...] = (
             uplot.Series(label="s"),
             *(
-                uplot.Series(label=curve.label, stroke=css(curve.color), width=2)
+                uplot.Series(label=name_of_curve(curve.label), stroke=css(curve.color), width=2)
                 for curve in curves
             ),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.shown import Markdown
 from hmcs_console.telling.reasons import Reasons, Rival, Support
 
 _STRAIGHT_RAD = np.radians(5.0)
@@ -15,11 +16,12 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 """Along x, y and z, and against them."""
 
 
-def reasons(told: Reasons | None) -> str:
+def reasons(told: Reasons | None) -> Markdown:
     """Return what is known of the likely state and of those that might take over."""
     if told is None:
-        return ""
-    return "\n\n".join(part for part in (_along(told), _supported(told), _changing(told)) if part)
+        return Markdown("")
+    parts = (_along(told), _supported(told), _changing(told))
+    return Markdown("\n\n").join(part for part in parts if part)
 
 
 def side(direction: NDArray[np.float64]) -> str:
@@ -37,45 +39,48 @@ def side(direction: NDArray[np.float64]) -> str:
     return f"{' and '.join(reversed(named))} (toward {sign}{'xyz'[axis]})"
 
 
-def _along(told: Reasons) -> str:
+def _along(told: Reasons) -> Markdown:
     if told.progress is None or told.left_m is None:
-        return ""
-    return f"{told.progress:.0%} along {told.likely}'s path, {told.left_m * 1e3:.0f} mm to go"
+        return Markdown("")
+    return Markdown("{:.0%} along {}'s path, {:.0f} mm to go").format(
+        told.progress, told.likely, told.left_m * 1e3
+    )
 
 
-def _supported(told: Reasons) -> str:
+def _supported(told: Reasons) -> Markdown:
     if not told.support:
-        return ""
-    return "Newest step, against the background: " + ", ".join(map(_support, told.support))
+        return Markdown("")
+    return Markdown("Newest step, against the background: {}").format(
+        Markdown(", ").join(map(_support, told.support))
+    )
 
 
-def _support(support: Support) -> str:
-    name = (
-        support.gesteme
-        if support.gesteme == support.state
-        else f"{support.gesteme} ({support.state})"
+def _support(support: Support) -> Markdown:
+    name = Markdown("{}" if support.gesteme == support.state else "{} ({})").format(
+        support.gesteme, support.state
     )
     if support.log_ratio_nats is None:
-        return f"{name} ruled out"
-    return f"{name} {support.log_ratio_nats:+.2f} nats"
+        return Markdown("{} ruled out").format(name)
+    return Markdown("{} {:+.2f} nats").format(name, support.log_ratio_nats)
 
 
-def _changing(told: Reasons) -> str:
+def _changing(told: Reasons) -> Markdown:
     if not told.rivals:
-        return ""
-    lines = [f"- {_rival(rival)}" for rival in told.rivals]
-    return "\n".join(["What would change its mind:", "", *lines])
+        return Markdown("")
+    lines = [Markdown("- {}").format(_rival(rival)) for rival in told.rivals]
+    head = [Markdown("What would change its mind:"), Markdown("")]
+    return Markdown("\n").join([*head, *lines])
 
 
-def _rival(rival: Rival) -> str:
-    name = f"**{rival.state}** ({rival.probability:.0%}{', may follow' if rival.follows else ''})"
-    lacking = (
-        "" if rival.odds_nats is None else f" would take over after {rival.odds_nats:.1f} nats more"
+def _rival(rival: Rival) -> Markdown:
+    name = Markdown("**{}** ({:.0%}{})").format(
+        rival.state, rival.probability, ", may follow" if rival.follows else ""
     )
+    lacking = Markdown("")
+    if rival.odds_nats is not None:
+        lacking = Markdown(" would take over after {:.1f} nats more").format(rival.odds_nats)
     turn = _turn(rival)
-    if not turn:
-        return name + lacking
-    return f"{name}{lacking}: a hand that {turn}"
+    return Markdown("{}{}: a hand that {}" if turn else "{}{}").format(name, lacking, turn)
 
 
 def _turn(rival: Rival) -> str:

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from hmcs.fixtures.rules import Rules, rules_of
 from hmcs.fixtures.volumes import Volume
+from hmcs.shown import Markdown
 from hmcs.task import Task
 
-_HEAD = "| state | law, compliance | ξ | volume, radius | leads |\n|---|---|---|---|---|"
+_HEAD = Markdown("| state | law, compliance | ξ | volume, radius | leads |\n|---|---|---|---|---|")
 
 
-def rules(task: Task | None, state_now: str) -> str:
+def rules(task: Task | None, state_now: str) -> Markdown:
     """Return law, compliance, maximum factor ξ, volume and aim of every state of a task.
 
     The state of the moment is in bold.
     """
     if task is None:
-        return "No recognizer is followed whose model is known here."
+        return Markdown("No recognizer is followed whose model is known here.")
     every = rules_of(task)
     rows = [
         _row(state.name, every.in_state(state.name), state.name == state_now)
         for state in task.states
     ]
-    return "\n".join([f"**{task.name}**", "", _HEAD, *rows])
+    name = Markdown("**{}**").format(task.name)
+    return Markdown("\n").join([name, Markdown(""), _HEAD, *rows])
 
 
-def _row(state: str, rules: Rules, now: bool) -> str:
+def _row(state: str, rules: Rules, now: bool) -> Markdown:
     cells = (
         state,
         f"{rules.law}, {_compliance(rules)}",
@@ -32,7 +34,8 @@ def _row(state: str, rules: Rules, now: bool) -> str:
         _volume(rules.volume),
         _aim(rules),
     )
-    return "| " + " | ".join(f"**{cell}**" if now else cell for cell in cells) + " |"
+    cell = Markdown("**{}**" if now else "{}")
+    return Markdown("| {} |").format(Markdown(" | ").join(map(cell.format, cells)))
 
 
 def _compliance(rules: Rules) -> str:

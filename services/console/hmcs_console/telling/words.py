@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
+from hmcs.shown import Markdown
 from hmcs_console.seeing.shadows import Agreement
 from hmcs_console.teaching.marking import Marking
 
+MOST_NAMES = 12
+"""Of a list of names so many are written out."""
+_LINES, _PARAGRAPHS = Markdown("  \n"), Markdown("\n\n")
 _REASONS = {
     "guiding": "guides: the state is recognized",
     "unsure": "gives way: no state is sure enough",
@@ -21,75 +25,71 @@ _REASONS = {
 }
 
 
-def why(belief: Belief | None) -> str:
+def several(names: Sequence[str]) -> Markdown:
+    """Return names, the first of many, with how many more there are."""
+    told = Markdown(", ").join(names[:MOST_NAMES])
+    more = len(names) - MOST_NAMES
+    return Markdown("{} and {} more").format(told, more) if more > 0 else told
+
+
+def why(belief: Belief | None) -> Markdown:
     """Return what is recognized, and what that stands on."""
     if belief is None or not belief.states:
-        return "**Nothing is recognized**: no recognizer has said anything yet."
+        return Markdown("**Nothing is recognized**: no recognizer has said anything yet.")
     lines = [
-        f"**{belief.likely_state}** {belief.confidence:.0%}, unknown {belief.unknown:.0%}",
-        f"gesteme {belief.likely_gesteme or '—'}, since step {belief.segment_start} "
-        f"of {belief.step}",
-        f"log likelihood {belief.log_likelihood:+.2f} nats, "
-        f"over the last steps {belief.mean_log_likelihood:+.2f}",
+        Markdown("**{}** {:.0%}, unknown {:.0%}").format(
+            belief.likely_state, belief.confidence, belief.unknown
+        ),
+        Markdown("gesteme {}, since step {} of {}").format(
+            belief.likely_gesteme or "—", belief.segment_start, belief.step
+        ),
+        Markdown("log likelihood {:+.2f} nats, over the last steps {:+.2f}").format(
+            belief.log_likelihood, belief.mean_log_likelihood
+        ),
     ]
     if belief.unknown_alarm:
-        lines.append("**alarm**: the last steps fit no part of the task")
+        lines.append(Markdown("**alarm**: the last steps fit no part of the task"))
     if belief.missing_gestemes:
-        lines.append(f"**missing**: no evidence of {', '.join(belief.missing_gestemes)}")
-    return "  \n".join(lines)
+        missing = several(belief.missing_gestemes)
+        lines.append(Markdown("**missing**: no evidence of {}").format(missing))
+    return _LINES.join(lines)
 
 
-def doing(fixture: FixtureState | None, robot: RobotState | None) -> str:
+def doing(fixture: FixtureState | None, robot: RobotState | None) -> Markdown:
     """Return what fixture and robot do, and why."""
-    lines = []
-    if fixture is None:
-        lines.append("**No fixture controller** is heard.")
-    else:
-        lines += [
-            f"**{fixture.law} law** {_REASONS[fixture.reason]}",
-            f"factor {fixture.factor:.2f}, compliance {fixture.compliance:.2f}, "
-            f"{'engaged' if fixture.engaged else 'not engaged'}",
-        ]
-        if fixture.off_guide_m is not None:
-            lines.append(
-                f"{fixture.progress:.0%} along {fixture.gesteme or 'the guide'}, "
-                f"{fixture.off_guide_m * 1e3:.1f} mm beside it"
+    return _LINES.join([*_fixture(fixture), *_robot(robot)])
+
+
+def recognizers(
+    active: str, agreement: Mapping[str, Agreement], *, nobody_runs_it: bool = False
+) -> Markdown:
+    """Return who is followed, whether anybody runs it, and how the others agree."""
+    lines = [Markdown("follows **{}**").format(active or "no recognizer")]
+    if nobody_runs_it:
+        lines = [
+            Markdown("**follows {}, which nobody runs**: start one, or activate another").format(
+                active
             )
-        if fixture.asks_for_help:
-            lines.append("**its plan is stuck: help it on**")
-    if robot is None:
-        lines.append("**No robot** is heard.")
-    else:
-        lines.append(f"{robot.robot} " + _standing(robot))
-        if robot.nearest_distance_m is not None:
-            lines.append(f"{robot.nearest_distance_m * 1e3:.0f} mm from {robot.nearest_obstacle}")
-        if robot.contacts:
-            lines.append(f"**touches** {', '.join(robot.contacts)}")
-    return "  \n".join(lines)
-
-
-def recognizers(active: str, agreement: Mapping[str, Agreement]) -> str:
-    """Return who is followed, and how the others agree."""
-    lines = [f"follows **{active or 'no recognizer'}**"]
+        ]
     for name, agreed in agreement.items():
         if agreed.compared:
-            share = agreed.same / agreed.compared
-            lines.append(f"{name} agrees in {share:.0%} of {agreed.compared} steps")
+            told = Markdown("{} agrees in {:.0%} of {} steps")
+            lines.append(told.format(name, agreed.same / agreed.compared, agreed.compared))
         else:
-            lines.append(f"{name} has no step in common with it yet")
-    return "  \n".join(lines)
+            lines.append(Markdown("{} has no step in common with it yet").format(name))
+    return _LINES.join(lines)
 
 
-def operates(operator: str) -> str:
+def operates(operator: str) -> Markdown:
     """Return who operates."""
     if not operator:
-        return "Nobody operates: drag the handle at the tool."
-    return f"**{operator}** operates."
+        return Markdown("Nobody operates: drag the handle at the tool.")
+    return Markdown("**{}** operates.").format(operator)
 
 
-def operating() -> str:
+def operating() -> Markdown:
     """Return how to operate."""
-    return (
+    return Markdown(
         "**Engage**: take the handle at the tool with the mouse; holding it is the dead-man's "
         "switch. **Let go**, and the robot stands. **Clutch** (C): the handle moves and the robot "
         "does not, to reach farther. **Stop** (S): every robot stands, whoever drives it, until "
@@ -98,50 +98,88 @@ def operating() -> str:
     )
 
 
-def services(health: Mapping[Member, Health | None]) -> str:
-    """Return how every process is that is there."""
-    if not health:
-        return "Nobody is there."
-    return "\n\n".join(_process(member, told) for member, told in health.items())
+def services(health: Mapping[Member, Health | None], unrun: str = "") -> Markdown:
+    """Return how every process is that is there, and which recognizer is followed unrun."""
+    told = [_process(member, how) for member, how in health.items()]
+    if unrun:
+        told.insert(0, Markdown("**The fixture follows {}, which nobody runs.**").format(unrun))
+    return _PARAGRAPHS.join(told) if told else Markdown("Nobody is there.")
 
 
-def training(progress: TrainingProgress | None) -> str:
+def training(progress: TrainingProgress | None) -> Markdown:
     """Return how far a training is."""
     if progress is None:
-        return "No training was heard of."
-    written = f"  \n{progress.path}" if progress.path else ""
-    return f"**{progress.model}** {progress.stage}: {progress.detail}{written}"
+        return Markdown("No training was heard of.")
+    told = Markdown("**{}** {}: {}").format(progress.model, progress.stage, progress.detail)
+    return _LINES.join([told, progress.path]) if progress.path else told
 
 
-def _standing(robot: RobotState) -> str:
-    if robot.stop == "asked":
-        return "**stands**: asked to, until its operator lets go and takes hold again"
-    if robot.stop != "none":
-        return f"**stands**: {robot.stop.replace('_', ' ')}"
-    return "follows" + (f", limited by {', '.join(robot.limited)}" if robot.limited else "")
-
-
-def _process(member: Member, told: Health | None) -> str:
-    name = f"**{member.service}** {member.instance}"
-    if told is None:
-        return f"{name}  \nhas not told how it is"
-    lost, late, refused = (
-        sum(counted.values()) for counted in (told.lost, told.late, told.refused)
-    )
-    return (
-        f"{name}, {told.loop_rate_hz:.0f} Hz  \n"
-        f"{'' if told.healthy else '**unhealthy**: '}{told.detail}  \n"
-        f"lost {lost}, late {late}, refused {refused}"
-    )
-
-
-def marking(now: Marking) -> str:
+def marking(now: Marking) -> Markdown:
     """Return which part of the task is marked, and what the pedal would mark."""
-    marked = f"now **{now.now}**" if now.now else "nothing is marked"
+    marked = Markdown("nothing is marked")
+    if now.now:
+        marked = Markdown("now **{}**").format(now.now)
     if not now.by_pedal:
         return marked
     if now.order is None:
-        return f"{marked}; which part is next nobody knows: give the console a task"
-    return f"{marked}; the pedal (key P) " + (
-        f"begins **{now.next}**" if now.next else "ends the task"
+        told = Markdown("{}; which part is next nobody knows: give the console a task")
+        return told.format(marked)
+    if not now.next:
+        return Markdown("{}; the pedal (key P) ends the task").format(marked)
+    return Markdown("{}; the pedal (key P) begins **{}**").format(marked, now.next)
+
+
+def _fixture(fixture: FixtureState | None) -> Iterable[Markdown]:
+    if fixture is None:
+        yield Markdown("**No fixture controller** is heard.")
+        return
+    yield Markdown("**{} law** {}").format(fixture.law, _REASONS[fixture.reason])
+    yield Markdown("factor {:.2f}, compliance {:.2f}, {}").format(
+        fixture.factor, fixture.compliance, "engaged" if fixture.engaged else "not engaged"
+    )
+    if fixture.off_guide_m is not None:
+        yield Markdown("{:.0%} along {}, {:.1f} mm beside it").format(
+            fixture.progress, fixture.gesteme or "the guide", fixture.off_guide_m * 1e3
+        )
+    if fixture.asks_for_help:
+        yield Markdown("**its plan is stuck: help it on**")
+
+
+def _robot(robot: RobotState | None) -> Iterable[Markdown]:
+    if robot is None:
+        yield Markdown("**No robot** is heard.")
+        return
+    yield Markdown("{} {}").format(robot.robot, _standing(robot))
+    if robot.nearest_distance_m is not None:
+        yield Markdown("{:.0f} mm from {}").format(
+            robot.nearest_distance_m * 1e3, robot.nearest_obstacle
+        )
+    if robot.contacts:
+        yield Markdown("**touches** {}").format(several(robot.contacts))
+
+
+def _standing(robot: RobotState) -> Markdown:
+    if robot.stop == "asked":
+        return Markdown("**stands**: asked to, until its operator lets go and takes hold again")
+    if robot.stop != "none":
+        return Markdown("**stands**: {}").format(robot.stop.replace("_", " "))
+    if robot.limited:
+        return Markdown("follows, limited by {}").format(several(robot.limited))
+    return Markdown("follows")
+
+
+def _process(member: Member, told: Health | None) -> Markdown:
+    name = Markdown("**{}** {}").format(*member)
+    if told is None:
+        return _LINES.join([name, Markdown("has not told how it is")])
+    lost, late, refused = (
+        sum(counted.values()) for counted in (told.lost, told.late, told.refused)
+    )
+    how = Markdown("{}") if told.healthy else Markdown("**unhealthy**: {}")
+    return _LINES.join(
+        [
+            Markdown("{}, {:.0f} Hz").format(name, told.loop_rate_hz),
+            how.format(told.detail),
+            Markdown("lost {}, late {}, refused {}").format(lost, late, refused),
+        ]
     )

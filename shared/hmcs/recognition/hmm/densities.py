@@ -99,8 +99,11 @@ class Mixture:
         shares = []
         for sequence, posterior in zip(sequences, posteriors, strict=True):
             log_joint = self._log_joint(sequence)
-            total = np.logaddexp.reduce(log_joint, axis=2)
-            share = np.exp(log_joint - total[:, :, None]) * posterior[:, :, None]
+            top = log_joint.max(axis=2, keepdims=True)
+            share = np.exp(log_joint - np.where(np.isfinite(top), top, 0.0))
+            # Divided by their own sum they are shares, however far the observation lies.
+            total = share.sum(axis=2, keepdims=True)
+            share *= posterior[:, :, None] / np.where(total > 0, total, 1.0)
             shares.append(share.reshape(len(sequence), states * components))
         flat = (states * components, -1)
         means, variances = _moments(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.errors import UserError
+from hmcs.recognition.hmm.log_transitions import LogTransitions, log_of, log_sum
 
 Array = NDArray[np.float64]
 Path = NDArray[np.int64]
@@ -65,24 +66,20 @@ class Decoded(NamedTuple):
 
 def forward(initial: Array, transition: Array, log_emission: Array) -> Array:
     """Return log α, shape (T, N): the joint log P(o_1..o_t, state i at t) (2.5 as a joint, 2.6)."""
-    log_transition = _log(transition)
+    ways = LogTransitions(transition)
     log_alpha = np.empty_like(log_emission)
-    log_alpha[0] = _log(initial) + log_emission[0]
+    log_alpha[0] = log_of(initial) + log_emission[0]
     for t in range(1, len(log_emission)):
-        log_alpha[t] = (
-            _log_sum(log_alpha[t - 1][:, None] + log_transition, axis=0) + log_emission[t]
-        )
+        log_alpha[t] = ways.ahead(log_alpha[t - 1]) + log_emission[t]
     return log_alpha
 
 
 def backward(transition: Array, log_emission: Array) -> Array:
     """Return log β, shape (T, N): log P(o_{t+1}..o_T | state i at t)."""
-    log_transition = _log(transition)
+    ways = LogTransitions(transition)
     log_beta = np.zeros_like(log_emission)
     for t in range(len(log_emission) - 2, -1, -1):
-        log_beta[t] = _log_sum(
-            log_transition + (log_emission[t + 1] + log_beta[t + 1])[None, :], axis=1
-        )
+        log_beta[t] = ways.back(log_emission[t + 1] + log_beta[t + 1])
     return log_beta
 
 
@@ -115,39 +112,78 @@ def backward_scaled(transition: Array, log_emission: Array, scaled: ScaledForwar
     """
     beta = (scaled.states > 0).astype(np.float64)
     for t in range(len(log_emission) - 2, -1, -1):
-        shifted = log_emission[t + 1] - scaled.log_scales[t + 1]
-        ahead = beta[t + 1] * np.exp(np.where(beta[t + 1] > 0, shifted, 0.0))
+        possible = beta[t + 1] > 0
+        shifted = log_emission[t + 1] - log_emission[t + 1].max(initial=-np.inf, where=possible)
+        ahead = beta[t + 1] * np.exp(np.where(possible, shifted, 0.0))
         beta[t] *= transition @ ahead
+        # The same as the scales, but exact where likelihoods are large numbers.
+        total = float(scaled.states[t] @ beta[t])
+        beta[t] /= total if total > 0 else 1.0
     return beta
 
 
 def log_likelihood(initial: Array, transition: Array, log_emission: Array) -> float:
     """Return log P(o_1..o_T) (2.7); −inf for an impossible sequence."""
-    return float(_log_sum(forward(initial, transition, log_emission)[-1], axis=0))
+    try:
+        passed = _log_filtered(initial, LogTransitions(transition), log_emission)
+    except ImpossibleSequenceError:
+        return -np.inf
+    return float(passed.log_scales.sum())
 
 
 def smooth(initial: Array, transition: Array, log_emission: Array) -> Smoothed:
     """Return γ and the sum of ξ (2.11–2.12), given the whole sequence.
 
-    Raises ImpossibleSequenceError when the sequence has no probability under the model.
+    Each step is scaled by itself, so that probabilities sum to one however improbable what is
+    observed. Raises ImpossibleSequenceError when the sequence has no probability under the model.
     """
-    log_alpha = forward(initial, transition, log_emission)
-    total = float(_log_sum(log_alpha[-1], axis=0))
-    if not np.isfinite(total):
-        dead = int(np.argmax(~np.isfinite(log_alpha).any(axis=1)))
-        raise _impossible(log_emission, dead)
-    log_beta = backward(transition, log_emission)
-    log_xi = (
-        log_alpha[:-1, :, None]
-        + _log(transition)[None, :, :]
-        + (log_emission[1:] + log_beta[1:])[:, None, :]
-        - total
-    )
+    ways = LogTransitions(transition)
+    log_alpha, log_scales, tops = _log_filtered(initial, ways, log_emission)
+    reachable = np.isfinite(log_alpha)
+    # What is shown to the step before: log P(o_t, …, o_T | state at t), but for a factor.
+    log_next = np.where(reachable, log_emission - tops[:, None], -np.inf)
+    log_beta = np.zeros_like(log_alpha)
+    log_totals = np.zeros(len(log_alpha))
+    for t in range(len(log_alpha) - 2, -1, -1):
+        log_next[t + 1] += log_beta[t + 1]
+        back = ways.back(log_next[t + 1])
+        scale = float(back.max(initial=-np.inf, where=reachable[t]))
+        log_beta[t] = back - scale
+        log_totals[t] = scale + float(log_sum(log_alpha[t] + log_beta[t], axis=0))
+    states = log_alpha + log_beta
+    states = np.exp(states - states.max(axis=1, keepdims=True))
     return Smoothed(
-        np.exp(log_alpha + log_beta - total),
-        np.exp(log_xi).sum(axis=0),
-        total,
+        states / states.sum(axis=1, keepdims=True),
+        ways.summed(log_alpha[:-1] - log_totals[:-1, None], log_next[1:]),
+        float(log_scales.sum()),
     )
+
+
+class _LogFiltered(NamedTuple):
+    log_states: Array
+    """log P(state i at t | o_1..o_t), shape (T, N)."""
+    log_scales: Array
+    """log P(o_t | o_1..o_{t−1}), shape (T,)."""
+    tops: Array
+    """Largest log P(o_t | state) of the states that can be reached, shape (T,)."""
+
+
+def _log_filtered(initial: Array, ways: LogTransitions, log_emission: Array) -> _LogFiltered:
+    """Filter in logarithms, each step by its own scale; raises ImpossibleSequenceError."""
+    log_states = np.empty_like(log_emission)
+    log_scales, tops = np.empty((2, len(log_emission)))
+    predicted = log_of(initial)
+    for t, emission in enumerate(log_emission):
+        top = float(emission.max(initial=-np.inf, where=np.isfinite(predicted)))
+        if not np.isfinite(top):
+            raise _impossible(log_emission, t)
+        # Far from all states the likelihoods are large numbers, and their differences tell.
+        joint = predicted + (emission - top)
+        scale = float(log_sum(joint, axis=0))
+        log_states[t] = joint - scale
+        log_scales[t], tops[t] = scale + top, top
+        predicted = ways.ahead(log_states[t])
+    return _LogFiltered(log_states, log_scales, tops)
 
 
 def shortest_path(initial: Array, transition: Array, log_emission: Array) -> Decoded:
@@ -156,21 +192,27 @@ def shortest_path(initial: Array, transition: Array, log_emission: Array) -> Dec
     Of paths of equal cost the one through states of smaller index wins, from the end backward.
     Raises ImpossibleSequenceError when the sequence has no probability under the model.
     """
-    transition_cost = -_log(transition)
+    transition_cost = -log_of(transition)
     costs = np.empty_like(log_emission)
     predecessors = np.zeros(log_emission.shape, dtype=np.int64)
-    costs[0] = -_log(initial) - log_emission[0]
-    for t in range(1, len(log_emission)):
-        ways = costs[t - 1][:, None] + transition_cost
-        predecessors[t] = ways.argmin(axis=0)
-        costs[t] = ways.min(axis=0) - log_emission[t]
-    dead = ~np.isfinite(costs).any(axis=1)
-    if dead.any():
-        raise _impossible(log_emission, int(dead.argmax()))
+    least = np.empty((len(log_emission), 1))
+    reached = -log_of(initial)
+    for t, emission in enumerate(log_emission):
+        if t:
+            ways = costs[t - 1][:, None] + transition_cost
+            predecessors[t] = ways.argmin(axis=0)
+            reached = ways.min(axis=0)
+        costs[t] = reached - emission
+        least[t] = costs[t].min()
+        if not np.isfinite(least[t]):
+            raise _impossible(log_emission, t)
+        # What all paths have in common is added last: beside it the differences would be lost.
+        costs[t] -= least[t]
     path = np.empty(len(log_emission), dtype=np.int64)
     path[-1] = costs[-1].argmin()
     for t in range(len(log_emission) - 1, 0, -1):
         path[t - 1] = predecessors[t, path[t]]
+    costs += least.cumsum(axis=0)
     return Decoded(path, float(costs[-1].min()), costs, predecessors)
 
 
@@ -196,16 +238,3 @@ def _impossible(log_emission: Array, step: int) -> ImpossibleSequenceError:
     return ImpossibleSequenceError(
         f"the sequence is impossible under the model from its observation {step} on; {why}", step
     )
-
-
-def _log(probabilities: Array) -> Array:
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(probabilities))
-
-
-def _log_sum(values: Array, axis: int) -> Array:
-    top = values.max(axis=axis, keepdims=True)
-    safe = np.where(np.isfinite(top), top, 0.0)
-    with np.errstate(divide="ignore"):
-        total = np.log(np.exp(values - safe).sum(axis=axis, keepdims=True)) + safe
-    return np.asarray(total.squeeze(axis=axis))

@@ -196,12 +196,16 @@ class _Bank:
     def belief(self, state: _LayerState) -> LayerBelief:
         """Return what is believed of the window from its first start on, without an output."""
         log_joint = state.log_alpha[0] if state.seen else self._log_initial
-        joint = np.exp(log_joint - np.logaddexp.reduce(log_joint, axis=None))
+        joint = np.exp(log_joint - log_joint.max())
+        joint /= joint.sum()
         states = tuple(row[:size] for row, size in zip(joint, self._sizes, strict=True))
         return LayerBelief(joint.sum(axis=1), states, None)
 
     def advanced(self, state: _LayerState, evidence: Any) -> tuple[_LayerState, LayerBelief]:
-        log_alpha = self._moved(state) + self._log_emission(evidence)
+        moved, log_emission = self._moved(state), self._log_emission(evidence)
+        top = log_emission.max(where=np.isfinite(moved).any(axis=0), initial=-np.inf)
+        # What all starts and models have in common tells nothing, and may be large.
+        log_alpha = moved + (log_emission - (top if np.isfinite(top) else 0.0))
         if not np.isfinite(log_alpha[0]).any():
             raise ImpossibleSequenceError(
                 f"layer {self._number}: no model gives its window a probability with observation "

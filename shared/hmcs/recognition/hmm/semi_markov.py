@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from hmcs.recognition.hmm.durations import DurationError
 from hmcs.recognition.hmm.inference import ImpossibleSequenceError
+from hmcs.recognition.hmm.log_transitions import log_of
 from hmcs.recognition.hmm.markov import Array, States, checked_rows
 
 
@@ -112,41 +113,45 @@ def filtered(model: DurationHmm, log_emission: Array) -> Filtered:
     Raises DurationError for a wrong shape, ImpossibleSequenceError for observations that the model
     gives no probability.
     """
-    log_alpha = _forward(model, log_emission)
-    running = np.logaddexp.reduce(log_alpha, axis=(1, 2))
-    states = np.exp(np.logaddexp.reduce(log_alpha, axis=2) - running[:, None])
-    return Filtered(states, np.diff(running, prepend=0.0))
+    passed = _forward(model, log_emission)
+    return Filtered(_states_of(passed.log_states), passed.log_scales)
 
 
 def smoothed(model: DurationHmm, log_emission: Array) -> Array:
     """Return γ: P(state i at t | all observations), shape (T, N). Raises as `filtered`."""
-    log_alpha = _forward(model, log_emission)
-    log_durations, log_transition = _log(model.durations), _log(model.transition)
+    log_alpha, _, tops = _forward(model, log_emission)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
     log_beta = np.zeros_like(log_alpha)
     for t in range(len(log_emission) - 2, -1, -1):
-        ahead = log_emission[t + 1][:, None] + log_beta[t + 1]
+        ahead = (log_emission[t + 1] - tops[t + 1])[:, None] + log_beta[t + 1]
+        ahead = np.where(np.isfinite(log_alpha[t + 1]), ahead, -np.inf)
         entered = np.logaddexp.reduce(log_durations + ahead, axis=1)
         log_beta[t, :, 0] = np.logaddexp.reduce(log_transition + entered, axis=1)
         log_beta[t, :, 1:] = ahead[:, :-1]
-    joint = np.logaddexp.reduce(log_alpha + log_beta, axis=2)
-    return np.asarray(np.exp(joint - np.logaddexp.reduce(log_alpha[-1], axis=None)))
+        log_beta[t] -= log_beta[t].max(where=np.isfinite(log_alpha[t]), initial=-np.inf)
+    return _states_of(log_alpha + log_beta)
 
 
 def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
     """Return the most probable segmentation. Raises as `filtered`."""
     _check_emission(model, log_emission)
-    log_durations, log_transition = _log(model.durations), _log(model.transition)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
     steps = len(log_emission)
-    best = _log(model.initial)[:, None] + log_durations + log_emission[0][:, None]
+    best, log_probability = log_of(model.initial)[:, None] + log_durations, 0.0
     entered_from = np.full((steps, *best.shape), -1, dtype=np.int64)
-    for t in range(1, steps):
-        leaving = best[:, :1] + log_transition
-        entered = leaving.max(axis=0)[:, None] + log_durations
-        stayed = _remaining_less(best)
-        entered_from[t] = np.where(entered > stayed, leaving.argmax(axis=0)[:, None], -1)
-        best = np.maximum(entered, stayed) + log_emission[t][:, None]
-    if not np.isfinite(best.max()):
-        raise _impossible(_forward_unchecked(model, log_emission))
+    for t in range(steps):
+        if t:
+            leaving = best[:, :1] + log_transition
+            entered = leaving.max(axis=0)[:, None] + log_durations
+            stayed = _remaining_less(best)
+            entered_from[t] = np.where(entered > stayed, leaving.argmax(axis=0)[:, None], -1)
+            best = np.maximum(entered, stayed)
+        best = best + log_emission[t][:, None]
+        top = float(best.max())
+        if not np.isfinite(top):
+            raise _impossible(t)
+        # What all have in common is set apart: beside it the differences would be lost.
+        best, log_probability = best - top, log_probability + top
     state, remaining = divmod(int(best.argmax()), best.shape[1])
     path = np.empty(steps, dtype=np.int64)
     firsts = []
@@ -162,29 +167,45 @@ def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
     segments = tuple(
         Segment(int(path[first]), first, after - first) for first, after in pairwise(bounds)
     )
-    return Segmentation(segments, path, float(best.max()))
+    return Segmentation(segments, path, log_probability)
 
 
-def _forward(model: DurationHmm, log_emission: Array) -> Array:
+class _Forward(NamedTuple):
+    log_states: Array
+    """log P(state i with r steps that remain at t | o_0..o_t), shape (T, N, D)."""
+    log_scales: Array
+    """log P(o_t | o_0..o_{t−1}), shape (T,)."""
+    tops: Array
+    """Largest log P(o_t | state) of the states that can be reached, shape (T,)."""
+
+
+def _forward(model: DurationHmm, log_emission: Array) -> _Forward:
+    """Filter in logarithms, each step by its own scale."""
     _check_emission(model, log_emission)
-    log_alpha = _forward_unchecked(model, log_emission)
-    if not np.isfinite(log_alpha[-1]).any():
-        raise _impossible(log_alpha)
-    return log_alpha
-
-
-def _forward_unchecked(model: DurationHmm, log_emission: Array) -> Array:
-    """Return log P(o_0..o_t, state i with r steps that remain at t), shape (T, N, D)."""
-    log_durations, log_transition = _log(model.durations), _log(model.transition)
-    log_alpha = np.empty((len(log_emission), *log_durations.shape))
-    entered = _log(model.initial)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
+    log_states = np.empty((len(log_emission), *log_durations.shape))
+    log_scales, tops = np.empty((2, len(log_emission)))
+    entered = log_of(model.initial)
     stayed = np.full(log_durations.shape, -np.inf)
     for t, log_likelihood in enumerate(log_emission):
         moved = np.logaddexp(entered[:, None] + log_durations, stayed)
-        log_alpha[t] = moved + log_likelihood[:, None]
-        entered = np.logaddexp.reduce(log_alpha[t, :, :1] + log_transition, axis=0)
-        stayed = _remaining_less(log_alpha[t])
-    return log_alpha
+        reachable = np.isfinite(moved).any(axis=1)
+        top = float(log_likelihood.max(where=reachable, initial=-np.inf))
+        if not np.isfinite(top):
+            raise _impossible(t)
+        joint = moved + (log_likelihood - top)[:, None]
+        scale = float(np.logaddexp.reduce(joint, axis=None))
+        log_states[t] = joint - scale
+        log_scales[t], tops[t] = scale + top, top
+        entered = np.logaddexp.reduce(log_states[t, :, :1] + log_transition, axis=0)
+        stayed = _remaining_less(log_states[t])
+    return _Forward(log_states, log_scales, tops)
+
+
+def _states_of(log_joint: Array) -> Array:
+    """P(state i at t), shape (T, N), of log joint weights, shape (T, N, D)."""
+    joint = np.exp(log_joint - log_joint.max(axis=(1, 2), keepdims=True)).sum(axis=2)
+    return np.asarray(joint / joint.sum(axis=1, keepdims=True))
 
 
 def _remaining_less(log_values: Array) -> Array:
@@ -208,15 +229,9 @@ def _check_emission(model: DurationHmm, log_emission: Array) -> None:
         )
 
 
-def _impossible(log_alpha: Array) -> ImpossibleSequenceError:
-    dead = int(np.argmax(~np.isfinite(log_alpha).any(axis=(1, 2))))
+def _impossible(dead: int) -> ImpossibleSequenceError:
     return ImpossibleSequenceError(
         f"the sequence is impossible under the model from its observation {dead} on: "
         "check durations, structural zeros and emission floors",
         dead,
     )
-
-
-def _log(probabilities: Array) -> Array:
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(probabilities))

@@ -7,7 +7,7 @@ installed distribution.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
 
@@ -110,12 +110,18 @@ def setting_values(settings: Any, prefix: str = "") -> Iterator[tuple[str, Any]]
             yield f"{prefix}{field}", value
 
 
-def recognizer_of(model: Model, *, anywhere: bool = False) -> Recognizer:
+def recognizer_of(
+    model: Model, *, anywhere: bool = False, tell: Callable[[str], None] | None = None
+) -> Recognizer:
     """Return a fresh recognizer of a model.
 
-    It begins with the task's first state or, with `anywhere`, in any of its states.
+    It begins with the task's first state or, with `anywhere`, in any of its states. Where it fails
+    at a step, it raises what went wrong, and with the next step begins anew in any state; `tell`
+    is told so, or the log of this package.
     """
-    return Guarded(kind_named(model.recognizer).recognizer(model, anywhere))
+    make = kind_named(model.recognizer).recognizer
+    guarded = partial(Guarded, make(model, anywhere), lambda: make(model, True))
+    return guarded() if tell is None else guarded(tell)
 
 
 def _replaced(defaults: Any, given: Mapping[str, str]) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from hmcs.recognition.recognizers.observing import (
     Observed,
     Observer,
     Observing,
+    check_observing,
     learn_observing,
     observations,
 )
@@ -73,14 +74,8 @@ def learn_gestemes(
 def check_gestemes(gestemes: Gestemes, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task."""
     check_gesteme_hmms(gestemes.hmms, len(task.gestemes))
-    fourier, encoding = gestemes.observing
-    features = len(axes_of(task))
-    if fourier is not None and fourier.kept == "complex":
-        features *= fourier.window_steps
-    elif fourier is not None:
-        features *= fourier.window_steps // 2 + 1
-    if encoding is not None and encoding[0].shape[-1] != features:
-        raise ValueError(f"{encoding[0].shape[-1]} features in symbols, expected {features}")
+    encoding = gestemes.observing.encoding
+    features = check_observing(gestemes.observing, len(axes_of(task)))
     emissions = gestemes.hmms.emissions
     expected: tuple[int, ...] = (features,)
     if encoding is not None:

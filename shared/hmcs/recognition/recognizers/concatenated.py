@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import LEAST_SPREAD, check_shapes, check_spreads, check_within
 from hmcs.recognition.hmm.inference import shortest_path
 from hmcs.recognition.model import axes_of
 from hmcs.recognition.recognizers.gesteme_hmms import (
@@ -229,8 +230,7 @@ def check_network(knowledge: NetworkKnowledge, task: Task) -> None:
     dimensions = normals_of(knowledge.hmms).means.shape[2]
     if dimensions not in (axes + 1, axes + 7):
         raise ValueError(f"{dimensions} dimensions, expected {axes + 1}, or {axes + 7} with force")
-    if knowledge.scales.shape != (dimensions,) or knowledge.leaving.shape != (gestemes,):
-        raise ValueError(
-            f"scales of shape {knowledge.scales.shape} and leaving of {knowledge.leaving.shape}, "
-            f"expected ({dimensions},) and ({gestemes},)"
-        )
+    check_shapes(knowledge._asdict(), {"scales": (dimensions,), "leaving": (gestemes,)})
+    check_spreads("scales", knowledge.scales)
+    check_within("leaving", knowledge.leaving, LEAST_SPREAD, 1.0)
+    check_within("off_network", knowledge.off_network, 0.0, 1.0)

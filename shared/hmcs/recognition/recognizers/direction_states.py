@@ -13,6 +13,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.recognition.checking import (
+    LEAST_SPREAD,
+    check_distributions,
+    check_shapes,
+    check_within,
+)
 from hmcs.recognition.directions import (
     DirectionError,
     FoundDirections,
@@ -176,21 +182,20 @@ def unit_rows(steps: Array) -> Array:
 
 def check_direction_states(states: DirectionStates, axes: int) -> None:
     """Raise ValueError where the arrays do not fit together, or not so many axes."""
-    count = len(states.initial)
+    count = states.initial.size
     shapes = {
         "directions": (count, axes),
         "support": (count,),
         "initial": (count,),
         "transition": (count, count),
     }
-    for field, expected in shapes.items():
-        array = getattr(states, field)
-        if array.shape != expected:
-            raise ValueError(f"array {field!r} is of shape {array.shape}, expected {expected}")
+    check_shapes(states._asdict(), shapes)
+    check_within("directions", states.directions, -1.001, 1.001)
+    check_within("support", states.support, 0.0, 1.0)
     for field in ("initial", "transition"):
         rows = getattr(states, field)
-        if not (rows > 0).all() or not np.allclose(rows.sum(axis=-1), 1.0, rtol=0.0, atol=1e-8):
-            raise ValueError(f"array {field!r} does not hold probabilities that sum to one")
+        check_distributions(field, rows)
+        check_within(field, rows, LEAST_SPREAD, 1.0)
     check_estimator(states.estimator, count, axes)
 
 

@@ -12,6 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import (
+    LEAST_SPREAD,
+    check_distributions,
+    check_shapes,
+    check_within,
+)
 from hmcs.recognition.hmm.emissions import floored
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
@@ -125,11 +131,9 @@ def _check(known: DirectionTask, task: Task) -> None:
     slots = len(chain_of(task).slot_state)
     check_direction_states(known.directions, len(axes_of(task)))
     check_slot_chain(known.chain, slots)
-    expected = (slots, len(known.directions.initial))
-    if known.shares.shape != expected or not (known.shares > 0).all():
-        raise ValueError(
-            f"array 'shares' is of shape {known.shares.shape}, expected {expected} and above zero"
-        )
+    check_shapes(known._asdict(), {"shares": (slots, len(known.directions.initial))})
+    check_within("shares", known.shares, LEAST_SPREAD, 1.0)
+    check_distributions("shares", known.shares)
 
 
 KIND = Kind(

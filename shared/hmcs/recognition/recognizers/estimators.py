@@ -11,11 +11,22 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recognition.checking import (
+    LARGEST,
+    LEAST_SPREAD,
+    check_shapes,
+    check_spreads,
+    check_within,
+)
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.svm import Machines, SvmSettings, fit_machines, log_observations
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
+
+LEAST_WIDTH = 1e-9
+"""A kernel narrower, or a sigmoid flatter than this, tells nothing apart; its square is a number
+that can still be divided by."""
 
 
 class EstimatorSettings(NamedTuple):
@@ -87,18 +98,25 @@ def class_means(observations: Array, classes: Integers, count: int) -> Array:
 
 def check_estimator(estimator: Estimator, count: int, dimensions: int) -> None:
     """Raise ValueError where it is not an estimator of so many classes and dimensions."""
+    check_within("least_ratio", estimator.least_ratio, 0.0, 1.0)
     if isinstance(estimator, Gaussians):
-        sound = estimator.means.shape == (count, dimensions) and estimator.variance > 0
-    else:
-        machines = estimator.machines
-        vectors = len(machines.vectors)
-        sound = (
-            machines.vectors.shape == (vectors, dimensions)
-            and machines.dual.shape == (count, vectors)
-            and machines.intercepts.shape == (count,)
-            and machines.priors.shape == (count,)
-            and bool((machines.priors > 0).all())
-            and machines.rbf_width > 0
-        )
-    if not (sound and estimator.least_ratio >= 0):
-        raise ValueError(f"the estimator is not for {count} classes in {dimensions} dimensions")
+        check_shapes(estimator._asdict(), {"means": (count, dimensions)})
+        check_within("means", estimator.means, -LARGEST, LARGEST)
+        check_spreads("variance", estimator.variance)
+        return
+    machines = estimator.machines
+    vectors = len(machines.vectors) if machines.vectors.ndim else 0
+    check_shapes(
+        machines._asdict(),
+        {
+            "vectors": (vectors, dimensions),
+            "dual": (count, vectors),
+            "intercepts": (count,),
+            "priors": (count,),
+        },
+    )
+    for name in ("vectors", "dual", "intercepts"):
+        check_within(name, getattr(machines, name), -LARGEST, LARGEST)
+    check_within("priors", machines.priors, LEAST_SPREAD, 1.0)
+    check_within("rbf_width", machines.rbf_width, LEAST_WIDTH, LARGEST)
+    check_within("sigmoid_slope", machines.sigmoid_slope, LEAST_WIDTH, LARGEST)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, check_within
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.recognizers import Kind, Lesson
@@ -167,14 +168,11 @@ def _recognizer(model: Model, anywhere: bool) -> Recognizer:
 def _check(known: ForceTask, task: Task) -> None:
     count = len(known.components)
     axes = 6 if known.observed == "wrench" else 3
-    if not all(0 <= component < axes for component in known.components):
-        raise ValueError(f"components {known.components}: expected indices below {axes}")
-    for field in ("center", "scale"):
-        array = getattr(known, field)
-        if array.shape != (count,):
-            raise ValueError(f"array {field!r} is of shape {array.shape}, expected {(count,)}")
-    if not (known.scale > 0).all():
-        raise ValueError("array 'scale' has entries that are not above zero")
+    check_within("number of components", count, 1, axes)
+    check_within("components", np.array(known.components), 0, axes - 1)
+    check_shapes(known._asdict(), {"center": (count,), "scale": (count,)})
+    check_within("center", known.center, -LARGEST, LARGEST)
+    check_spreads("scale", known.scale)
     check_slot_chain(known.chain, len(chain_of(task).slot_state))
     check_estimator(known.estimator, len(task.gestemes), count)
 

@@ -12,6 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recognition.checking import (
+    LARGEST,
+    LEAST_SPREAD,
+    check_distributions,
+    check_shapes,
+    check_spreads,
+    check_within,
+)
 from hmcs.recognition.hmm.bank import GaussianScores
 from hmcs.recognition.hmm.batch import baum_welch_many
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, MultiDiscrete, Observations
@@ -120,23 +128,38 @@ def normals_of(hmms: GestemeHmms) -> Normals:
 
 
 def check_gesteme_hmms(hmms: GestemeHmms, gestemes: int) -> None:
-    """Raise ValueError where the arrays do not fit together, or not so many gestemes."""
-    states = hmms.chains.initial.shape[-1]
-    shapes = {
-        "initial": (hmms.chains.initial, (gestemes, states)),
-        "transition": (hmms.chains.transition, (gestemes, states, states)),
-        "states": (hmms.chains.states, (gestemes,)),
-    }
-    for field, emission in hmms.emissions._asdict().items():
-        first = next(iter(hmms.emissions))
-        shapes[field] = (emission, (gestemes, states, *first.shape[2:]))
-        if field != "means" and not (emission > 0).all():
-            raise ValueError(f"array {field!r} has entries that are not above zero")
-    for field, (array, expected) in shapes.items():
-        if array.shape != expected:
-            raise ValueError(f"array {field!r} is of shape {array.shape}, expected {expected}")
-    if not ((hmms.chains.states >= 1) & (hmms.chains.states <= states)).all():
-        raise ValueError(f"gestemes of {hmms.chains.states} states, expected 1 to {states}")
+    """Raise ValueError where the arrays do not fit together, or not so many gestemes, or hold no
+    probabilities or widths."""
+    chains, emissions = hmms
+    states = chains.initial.shape[-1] if chains.initial.ndim == 2 else 0
+    first = next(iter(emissions))
+    emitted = dict.fromkeys(emissions._fields, (gestemes, states, *first.shape[2:]))
+    check_shapes(
+        {**chains._asdict(), **emissions._asdict()},
+        {"initial": (gestemes, states), "transition": (gestemes, states, states), **emitted},
+    )
+    check_shapes(chains._asdict(), {"states": (gestemes,)}, np.int64)
+    check_within("states of a gesteme", chains.states, 1, states)
+    if isinstance(emissions, Normals):
+        if first.ndim != 3:
+            raise ValueError(f"means are of shape {first.shape}, expected a vector for each state")
+        check_within("means", emissions.means, -LARGEST, LARGEST)
+        check_spreads("variances", emissions.variances)
+    else:
+        if first.ndim != 4:
+            raise ValueError(f"symbols of shape {first.shape}, expected a table for each state")
+        check_within("probabilities", first, LEAST_SPREAD, 1.0)
+        check_distributions("probabilities", first)
+    _check_chains(chains)
+
+
+def _check_chains(chains: GestemeChains) -> None:
+    """Refuse chains whose own states are no Markov chain, or whose padding can be reached."""
+    for initial, transition, count in zip(*chains, strict=True):
+        check_distributions("initial", initial[:count])
+        check_distributions("transition", transition[:count, :count])
+        if initial[count:].any() or transition[count:].any() or transition[:, count:].any():
+            raise ValueError("arrays 'initial' and 'transition' lead into states that are none")
 
 
 def _started(
@@ -169,7 +192,7 @@ def _emission(
         stacked, weights = np.concatenate(sequences), np.concatenate(passed)
         weights = weights / weights.sum(axis=0)
         means = weights.T @ stacked
-        variances = weights.T @ stacked**2 - means**2
+        variances = np.einsum("tn,tnf->nf", weights, (stacked[:, None] - means) ** 2)
         floor = settings.variance_floor
         return Gaussian(means, np.maximum(variances, floor), floor)
     even = Discrete(

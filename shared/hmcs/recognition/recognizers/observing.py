@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, check_within
 from hmcs.recognition.symbols import (
     Bins,
     Codebook,
@@ -57,6 +58,35 @@ class Observing(NamedTuple):
         if isinstance(self.encoding, Bins):
             return self.encoding.count
         return len(self.encoding.centers)
+
+
+LONGEST_WINDOW_STEPS = 1_000
+"""Of a Fourier window."""
+MOST_SYMBOLS = 100_000
+
+
+def check_observing(observing: Observing, axes: int) -> int:
+    """Return how many features of so many axes are observed.
+
+    Raises ValueError where windows, code book or bins are none, or for other features.
+    """
+    fourier, encoding = observing
+    features = axes
+    if fourier is not None:
+        check_within("window_steps", fourier.window_steps, 1, LONGEST_WINDOW_STEPS)
+        check_within("hop_steps", fourier.hop_steps, 1, LONGEST_WINDOW_STEPS)
+        whole = fourier.kept == "complex"
+        features *= fourier.window_steps if whole else fourier.window_steps // 2 + 1
+    if isinstance(encoding, Codebook):
+        check_shapes(encoding._asdict(), {"centers": (len(encoding.centers), features)})
+        check_within("centers", encoding.centers, -LARGEST, LARGEST)
+        check_within("number of centers", len(encoding.centers), 1, MOST_SYMBOLS)
+    elif isinstance(encoding, Bins):
+        check_shapes(encoding._asdict(), {"lower": (features,), "upper": (features,)})
+        check_within("lower", encoding.lower, -LARGEST, LARGEST)
+        check_spreads("upper - lower", encoding.upper - encoding.lower)
+        check_within("count", encoding.count, 1, MOST_SYMBOLS)
+    return features
 
 
 class Observer:

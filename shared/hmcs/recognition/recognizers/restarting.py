@@ -92,7 +92,8 @@ class ContinuedLevel:
         total, before = _log_total(likelihoods), self._total
         self._total = total
         start = self._start if self._heeds_marks else None
-        return Classification(np.exp(likelihoods - total), total - before, start)
+        gestemes = np.exp(likelihoods - likelihoods.max())
+        return Classification(gestemes / gestemes.sum(), total - before, start)
 
     @property
     def most_likely(self) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from hmcs.recognition.gesteme_learning import LearningSettings
 from hmcs.recognition.layered import LayeredRecognizer, Layers
-from hmcs.recognition.layers_learning import check_layers, learn_layers
+from hmcs.recognition.layers_checking import check_layers
+from hmcs.recognition.layers_learning import learn_layers
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
 from hmcs.recognition.recognizers import Kind, Lesson

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recognition.checking import check_distributions, check_shapes
 from hmcs.recognition.hmm.bank import ForwardBank
 from hmcs.recognition.hmm.durations import dwell_transition, mean_dwells_s
 from hmcs.recognition.hmm.inference import shortest_path
@@ -118,12 +119,9 @@ def most_probable_states(chain: TaskChain, slots: SlotChain, log_emission: Array
 def check_slot_chain(slots: SlotChain, count: int) -> None:
     """Raise ValueError where the arrays are no Markov chain of so many slots."""
     shapes = {"initial": (count,), "transition": (count, count)}
-    for field, expected in shapes.items():
-        array = getattr(slots, field)
-        if array.shape != expected:
-            raise ValueError(f"array {field!r} is of shape {array.shape}, expected {expected}")
-        if (array < 0).any() or not np.allclose(array.sum(axis=-1), 1.0, rtol=0.0, atol=1e-8):
-            raise ValueError(f"array {field!r} does not hold probabilities that sum to one")
+    check_shapes(slots._asdict(), shapes)
+    for field, array in slots._asdict().items():
+        check_distributions(field, array)
 
 
 def _anywhere(chain: TaskChain) -> Array:

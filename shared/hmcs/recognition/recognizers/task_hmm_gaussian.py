@@ -12,6 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import (
+    LARGEST,
+    check_choice,
+    check_shapes,
+    check_spreads,
+    check_within,
+)
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
@@ -145,18 +152,15 @@ def _recognizer(model: Model, anywhere: bool) -> Recognizer:
 
 
 def _check(hmm: GaussianTaskHmm, task: Task) -> None:
-    foreign = set(hmm.sensors) - set(Sensors._fields)
-    if foreign:
-        raise ValueError(f"unknown sensor {sorted(foreign)[0]!r}")
+    for name in hmm.sensors:
+        check_choice("a sensor", name, Sensors._fields)
+    check_within("number of sensors", len(hmm.sensors), 1, len(Sensors._fields))
     slots = len(chain_of(task).slot_state)
     check_slot_chain(hmm.chain, slots)
     shape = (slots, sum(dimensions(hmm.sensors, axes_of(task))))
-    for field in ("means", "variances"):
-        array = getattr(hmm, field)
-        if array.shape != shape:
-            raise ValueError(f"array {field!r} is of shape {array.shape}, expected {shape}")
-    if not (hmm.variances > 0).all():
-        raise ValueError("array 'variances' has entries that are not above zero")
+    check_shapes(hmm._asdict(), {"means": shape, "variances": shape})
+    check_within("means", hmm.means, -LARGEST, LARGEST)
+    check_spreads("variances", hmm.variances)
 
 
 KIND = Kind(

@@ -12,6 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recognition.checking import (
+    LEAST_SPREAD,
+    check_distributions,
+    check_shapes,
+    check_within,
+)
 from hmcs.recognition.hmm.emissions import Discrete
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.hmm.soft_evidence import learn_task
@@ -118,18 +124,18 @@ def gesteme_shares(chain: TaskChain, gestemes: int) -> Array:
 
 
 def check_task_hmm(task_hmm: TaskHmm, states: int, gestemes: int) -> None:
-    """Raise ValueError where the arrays are not for so many states and gestemes."""
+    """Raise ValueError where the arrays are not for so many states and gestemes, or hold no
+    probabilities above zero."""
     shapes = {
         "initial": (states,),
         "transition": (states, states),
         "gestemes": (states, gestemes),
     }
-    for field, expected in shapes.items():
-        array = getattr(task_hmm, field)
-        if array.shape != expected or not (array > 0).all():
-            raise ValueError(
-                f"array {field!r} is of shape {array.shape}, expected {expected} and above zero"
-            )
+    arrays = task_hmm._asdict()
+    check_shapes(arrays, shapes)
+    for field, array in arrays.items():
+        check_within(field, array, LEAST_SPREAD, 1.0)
+        check_distributions(field, array)
 
 
 def _labeled_runs(told: Told) -> Iterator[Told]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
+from hmcs.recognition.checking import LARGEST, check_within
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.recognizers import Lesson
@@ -106,6 +107,8 @@ def passed_up(classification: Classification, evidence: Evidence) -> Array:
 def check_two_levels(knowledge: TwoLevels, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task."""
     check_gestemes(knowledge.gestemes, task)
+    check_within("drift_nats", knowledge.cusum.drift_nats, 0.0, LARGEST)
+    check_within("threshold_nats", knowledge.cusum.threshold_nats, 0.0, LARGEST)
     check_task_hmm(knowledge.task, len(task.states), len(task.gestemes))
 
 

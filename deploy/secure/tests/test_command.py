@@ -1,0 +1,105 @@
+"""`hmcs secure …` as a person uses it."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from hmcs.model_signing import SignatureError, sign_model, signed_by
+from hmcs_secure import command
+from hmcs_secure.authority import AuthorityError, open_authority, utc_now
+from hmcs_secure.identity import IdentityError
+
+
+@pytest.fixture
+def call(tmp_path: Path):
+    """Run a command on the cells in a folder."""
+
+    def run(*words: str, fails: bool = False) -> Result:
+        done = CliRunner().invoke(command.app, [*words, "--folder", str(tmp_path)])
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        assert (done.exit_code != 0) == fails, done.output
+        return done
+
+    return run
+
+
+def test_a_new_cell_has_a_certificate_for_every_role_and_a_router(call, tmp_path) -> None:
+    told = call("init", "lab").output
+    assert "Keep" in told
+    assert "ca.key" in told
+    text = (tmp_path / "lab" / "router.json5").read_text(encoding="utf-8")
+    configuration = json.loads(re.sub(r"^//.*\n", "", text, flags=re.MULTILINE))
+    assert configuration["access_control"]["default_permission"] == "deny"
+    assert "every certificate" not in call("check", "lab").output
+    assert "lab/robot" in call("check", "lab").output
+
+
+def test_a_certificate_issued_later_is_known_to_the_routers_file(call, tmp_path) -> None:
+    call("init", "lab")
+    call("issue", "lab", "gesteme_classifier", "--instance", "gc-1")
+    assert "lab/gesteme_classifier/gc-1" in (tmp_path / "lab" / "router.json5").read_text()
+
+
+def test_what_expires_soon_is_told_and_renewed(call, monkeypatch, tmp_path) -> None:
+    call("init", "lab")
+    later = utc_now() + timedelta(days=350)
+    monkeypatch.setattr(command, "utc_now", lambda: later)
+    assert "expires soon" in call("check", "lab", fails=True).output
+    call("renew", "lab")
+    call("check", "lab")
+    assert open_authority(tmp_path / "lab").cell == "lab"
+
+
+def test_a_key_that_others_may_read_is_told(call, tmp_path) -> None:
+    call("init", "lab")
+    (tmp_path / "lab" / "holders" / "robot.key").chmod(0o644)
+    assert "others may read" in " ".join(call("check", "lab", fails=True).output.split())
+
+
+def test_mistakes_are_told(call) -> None:
+    with pytest.raises(AuthorityError, match="make one with `hmcs secure init`"):
+        call("check", "lab")
+    call("init", "lab")
+    with pytest.raises(IdentityError, match="no role 'roboter'"):
+        call("issue", "lab", "roboter")
+
+
+def test_a_signed_model_is_told_from_one_that_was_changed(call, tmp_path) -> None:
+    call("init", "lab")
+    cell, model = tmp_path / "lab", tmp_path / "mine.hmcs"
+    model.write_bytes(b"a model")
+    verify = signed_by(cell / "models.pub")
+    assert verify is not None
+    with pytest.raises(SignatureError, match="is not signed"):
+        verify(model, b"a model")
+    call("sign", "lab", str(model))
+    verify(model, b"a model")
+    with pytest.raises(SignatureError, match="not of this cell's key"):
+        verify(model, b"another model")
+    call("init", "other")
+    sign_model(model, tmp_path / "other" / "models.key")
+    with pytest.raises(SignatureError, match="not of this cell's key"):
+        verify(model, b"a model")
+
+
+@pytest.mark.parametrize("signature", [b"", b"!!!", b"\xff" * 100, b"AAAA" * 10])
+def test_a_signature_that_is_none_is_refused(call, tmp_path, signature) -> None:
+    call("init", "lab")
+    model = tmp_path / "mine.hmcs"
+    model.write_bytes(b"a model")
+    (tmp_path / "mine.hmcs.sig").write_bytes(signature)
+    verify = signed_by(tmp_path / "lab" / "models.pub")
+    assert verify is not None
+    with pytest.raises(SignatureError):
+        verify(model, b"a model")
+
+
+def test_without_a_key_nothing_is_verified() -> None:
+    assert signed_by(None) is None

@@ -1,0 +1,85 @@
+"""Who is there, and who works for which model, by the tokens they show.
+
+Anybody may show a token of any name. What is no name of a process is refused and counted here, so
+that nothing further on has to ask.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from hmcs.bus.keys import ANY, KeyNameError, Member, check_name
+from hmcs.bus.logs import Seldom
+from hmcs.bus.session import Bus
+from hmcs_console.seeing.seen import Seen
+
+REFUSED = "presence"
+"""As what a token that is refused is counted."""
+MOST_TOKENS = 256
+"""Of either kind; of more than those only a fault or an attacker has need."""
+
+
+class Presence:
+    """Follows the tokens of all processes; all of it on the thread that pumps the bus."""
+
+    def __init__(
+        self, bus: Bus, seen: Seen, log: logging.Logger, came: Callable[[Member], None]
+    ) -> None:
+        """Begin to follow them; `came` is told of each process that comes, but of this one."""
+        self._bus = bus
+        self._seen = seen
+        self._seldom = Seldom(log)
+        self._came = came
+        self._working: set[tuple[str, Member]] = set()
+        """Models, each with a process that works for it."""
+        bus.watch(bus.keys.presence(ANY, ANY), self._on_presence)
+        bus.watch(bus.keys.member(ANY, ANY, ANY), self._on_member)
+
+    def _on_presence(self, key: str, alive: bool) -> None:
+        member, members = self._member_in(key, alive), self._seen.members
+        if member is None or member == (self._bus.source.service, self._bus.source.instance):
+            return
+        if not alive:
+            members.discard(member)
+            self._seen.health.pop(member, None)
+        elif len(members) >= MOST_TOKENS:
+            self._refuse(key, f"{MOST_TOKENS} processes are there already")
+        else:
+            members.add(member)
+            self._came(member)
+
+    def _on_member(self, key: str, alive: bool) -> None:
+        member = self._member_in(key, alive)
+        if member is None:
+            return
+        model = key.split("/")[-4]
+        try:
+            check_name("model", model)
+        except KeyNameError as error:
+            self._refuse(key, str(error), alive)
+            return
+        if not alive:
+            if (model, member) in self._working:
+                self._working.discard((model, member))
+                self._seen.runners.went(model, member)
+        elif len(self._working) >= MOST_TOKENS:
+            self._refuse(key, f"{MOST_TOKENS} processes work for a model already")
+        else:
+            self._working.add((model, member))
+            self._seen.runners.came(model, member)
+
+    def _member_in(self, key: str, alive: bool) -> Member | None:
+        try:
+            member = self._bus.keys.member_of(key)
+            check_name("service", member.service)
+            check_name("instance", member.instance)
+        except KeyNameError as error:
+            self._refuse(key, str(error), alive)
+            return None
+        return member
+
+    def _refuse(self, key: str, reason: str, alive: bool = True) -> None:
+        if alive:
+            self._bus.counters.count_refused(REFUSED, reason)
+            self._seldom.warning(REFUSED, "presence refused", key=key, reason=reason)

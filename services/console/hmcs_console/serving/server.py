@@ -1,0 +1,71 @@
+"""The library's server of the page, kept to this machine, and quiet."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import viser
+
+from hmcs.bus.logs import Seldom
+from hmcs.shown import plain
+
+_LIBRARY_LOG = "websockets.server"
+
+
+class Server(viser.ViserServer):
+    """A viser server that nobody can make reach beyond this machine.
+
+    What goes wrong in it is a line of the log, seldom, and no traceback each time.
+    """
+
+    def __init__(self, log: logging.Logger) -> None:
+        with _quietly():
+            super().__init__(host="127.0.0.1", port=0, label="HMCS", verbose=False)
+        self._told = _Told(Seldom(log))
+        library = logging.getLogger(_LIBRARY_LOG)
+        library.addHandler(self._told)
+        library.propagate = False
+        loop = self.get_event_loop()
+        loop.call_soon_threadsafe(loop.set_exception_handler, self._told.failed)
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Refuse: a tunnel would let strangers move the robot."""
+        return None
+
+    def stop(self) -> None:
+        """End, with all its threads."""
+        logging.getLogger(_LIBRARY_LOG).removeHandler(self._told)
+        with _quietly():
+            super().stop()
+
+
+class _Told(logging.Handler):
+    """Hands on what the library says, and what fails in its tasks."""
+
+    def __init__(self, seldom: Seldom) -> None:
+        super().__init__(logging.WARNING)
+        self._seldom = seldom
+
+    def emit(self, record: logging.LogRecord) -> None:
+        error = record.exc_info[1] if record.exc_info else None
+        self._tell(record.getMessage(), error)
+
+    def failed(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Take in what failed in a task."""
+        self._tell(context["message"], context.get("exception"))
+
+    def _tell(self, what: str, error: BaseException | None) -> None:
+        reason = what if error is None else f"{what}: {type(error).__name__}: {error}"
+        self._seldom.warning("library", "the page's server failed", reason=plain(reason))
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    # The library greets and takes its leave on standard output, where it has no business.
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield

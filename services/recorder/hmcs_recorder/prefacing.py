@@ -1,0 +1,91 @@
+"""What is kept with a recording besides its messages: who is there, their settings and models."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import logging
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TypeVar
+
+from hmcs.bus.keys import ANY
+from hmcs.bus.messages import Ask, Description, Message, SettingsReport
+from hmcs.bus.session import Answer, Bus, StoppedError
+from hmcs.recordings.parts import Preface, as_fields
+from hmcs.recordings.reading import LARGEST_ATTACHMENT_BYTES
+
+M = TypeVar("M", bound=Message)
+
+ASK_S = 0.5
+
+
+def preface_of(bus: Bus, models: Sequence[Path], log: logging.Logger) -> Preface:
+    """Return who is there, what they are told to do, and the models they work with."""
+    members = {
+        f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
+        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "describe"), Ask(), Description)
+    }
+    settings = {
+        f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body.settings
+        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "settings"), Ask(), SettingsReport)
+    }
+    metadata = {
+        "hmcs": as_fields(
+            {
+                "version": importlib.metadata.version("hmcs"),
+                "cell": bus.settings.cell,
+                "begun": datetime.now(UTC).isoformat(),
+            }
+        )
+    }
+    for member, description in members.items():
+        facts = {"version": description.version, **description.facts}
+        if member in settings:
+            facts["settings"] = json.dumps(settings[member])
+        metadata[member] = as_fields(facts)
+    return Preface(metadata, dict(_kept(models, log)))
+
+
+def joined(*prefaces: Preface) -> Preface:
+    """Return all of several prefaces as one."""
+    return Preface(
+        {name: facts for each in prefaces for name, facts in each.metadata.items()},
+        {name: content for each in prefaces for name, content in each.attachments.items()},
+    )
+
+
+def ask_all(bus: Bus, key: str, question: Message, answer_type: type[M]) -> list[Answer[M]]:
+    """Return what all that are there answer; nothing once this process is to end."""
+    try:
+        return bus.ask(key, question, answer_type, ASK_S)
+    except StoppedError:
+        return []
+
+
+def _kept(places: Sequence[Path], log: logging.Logger) -> Iterator[tuple[str, bytes]]:
+    """Model files by names that are told apart; one that cannot be read is told and left out."""
+    taken: set[str] = set()
+    for file in _files(places):
+        try:
+            size = file.stat().st_size
+            if size > LARGEST_ATTACHMENT_BYTES:
+                raise OSError(f"it has {size / 1e6:.0f} MB, more than is read again")
+            content = file.read_bytes()
+        except OSError as error:
+            log.warning("a model is not kept", extra={"file": str(file), "reason": str(error)})
+            continue
+        name, number = file.name, 1
+        while name in taken:
+            number += 1
+            name = f"{file.stem}-{number}{file.suffix}"
+        taken.add(name)
+        yield name, content
+
+
+def _files(places: Sequence[Path]) -> list[Path]:
+    found: list[Path] = []
+    for place in places:
+        found += sorted(place.glob("*.hmcs")) if place.is_dir() else [place]
+    return [file for file in found if file.is_file()]

@@ -1,0 +1,90 @@
+"""How robots look, asked of them: without the names of its joints nobody can show a robot."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+
+from hmcs.bus.keys import ANY
+from hmcs.bus.messages import Ask, RobotLooks
+from hmcs.bus.session import Bus
+from hmcs.recordings.parts import Preface, Recording
+from hmcs_recorder.prefacing import ask_all
+
+JOINTS = "joints/"
+"""Metadata of this beginning and a robot's name say what its description calls its joints."""
+MOST_ASKED = 4
+"""So often a robot is asked that gives no answer: one that just starts may need some time."""
+RETRY_S = 5.0
+"""After so long it is asked again."""
+
+
+class Robots:
+    """What the robots of a cell say of how they look."""
+
+    def __init__(self, bus: Bus, log: logging.Logger) -> None:
+        self._bus, self._log = bus, log
+        self._looks: dict[str, RobotLooks] = {}
+        self._asked: dict[str, int] = {}
+        """How often each was asked in vain."""
+        self._again_s = 0.0
+
+    def ask(self) -> None:
+        """Ask all that are there."""
+        key = self._bus.keys.rpc("robot", ANY, "looks")
+        for answer in ask_all(self._bus, key, Ask(), RobotLooks):
+            self._looks[answer.body.robot] = answer.body
+
+    def kept(self) -> Iterator[Preface]:
+        """Yield what is kept of each: its description, and its joints' names in their order.
+
+        Of one that gives no answer, that it does not.
+        """
+        yield from map(_kept, self._looks.values())
+        for robot, times in self._asked.items():
+            if times == MOST_ASKED and robot not in self._looks:
+                yield _unknown(robot)
+
+    def name_joints(self, recording: Recording, now_ns: int) -> None:
+        """Have the robots in a recording shown by the names of their joints, asking some again.
+
+        That nobody says them is said in the recording and in the log. Raises OSError as writing
+        does.
+        """
+        nameless = recording.nameless
+        for robot in nameless & self._looks.keys():
+            recording.name_joints(robot, self._looks[robot].joints)
+        waiting = {
+            robot
+            for robot in nameless - self._looks.keys()
+            if self._asked.get(robot, 0) < MOST_ASKED
+        }
+        if not waiting or time.monotonic() < self._again_s:
+            return
+        self._again_s = time.monotonic() + RETRY_S
+        self.ask()
+        for robot in waiting:
+            looks = self._looks.get(robot)
+            if looks is not None:
+                recording.add(_kept(looks), now_ns)
+                recording.name_joints(robot, looks.joints)
+                continue
+            self._asked[robot] = self._asked.get(robot, 0) + 1
+            if self._asked[robot] == MOST_ASKED:
+                recording.add(_unknown(robot), now_ns)
+                self._log.warning(
+                    "a robot does not say how it looks: viewers cannot show its joints",
+                    extra={"robot": robot},
+                )
+
+
+def _kept(looks: RobotLooks) -> Preface:
+    urdf = f"{looks.robot}.urdf"
+    facts = {"joints": " ".join(looks.joints), "description": urdf}
+    return Preface({f"{JOINTS}{looks.robot}": facts}, {urdf: looks.urdf.encode()})
+
+
+def _unknown(robot: str) -> Preface:
+    facts = {"unknown": "it gives no answer to `looks`: its joints cannot be shown"}
+    return Preface({f"{JOINTS}{robot}": facts}, {})

@@ -1,0 +1,95 @@
+"""What stands in the cell as bodies of PyBullet: obstacles, and the shapes of forbidden regions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from hmcs.motion import quaternions
+from hmcs.task import ForbiddenRegion, Obstacle
+
+_FAR_M = 10.0
+"""Half the size of the box that stands for all behind a plane."""
+_ALONG_Z = np.array([0.0, 0.0, 1.0])
+
+
+def add_obstacle(obstacle: Obstacle, client: int) -> int:
+    """Add an obstacle that the arm collides with; return its body."""
+    collision: dict[str, Any]
+    visual: dict[str, Any]
+    if obstacle.size_m is not None:
+        kind = pybullet.GEOM_BOX
+        collision = visual = {"halfExtents": [length / 2 for length in obstacle.size_m]}
+    elif obstacle.length_m is not None:
+        kind = pybullet.GEOM_CYLINDER
+        collision = {"radius": obstacle.radius_m, "height": obstacle.length_m}
+        # PyBullet names the same length differently.
+        visual = {"radius": obstacle.radius_m, "length": obstacle.length_m}
+    else:
+        kind = pybullet.GEOM_SPHERE
+        collision = visual = {"radius": obstacle.radius_m}
+    body: int = pybullet.createMultiBody(
+        0,
+        pybullet.createCollisionShape(kind, **collision, physicsClientId=client),
+        pybullet.createVisualShape(
+            kind, **visual, rgbaColor=[0.45, 0.55, 0.65, 1], physicsClientId=client
+        ),
+        list(obstacle.position_m),
+        list(obstacle.orientation_xyzw),
+        physicsClientId=client,
+    )
+    return body
+
+
+def add_region(region: ForbiddenRegion, client: int) -> int:
+    """Add a forbidden region that distances are measured to and nothing collides with."""
+    position, turn = np.array(region.position_m), np.array(region.orientation_xyzw)
+    shape: dict[str, Any]
+    if region.shape == "plane":
+        normal = np.array(region.normal) / np.linalg.norm(np.array(region.normal))
+        shape = {"shapeType": pybullet.GEOM_BOX, "halfExtents": [_FAR_M] * 3}
+        position, turn = position - _FAR_M * normal, _turn_to(normal)
+    elif region.shape == "box" and region.size_m is not None:
+        half_m = [length / 2 for length in region.size_m]
+        shape = {"shapeType": pybullet.GEOM_BOX, "halfExtents": half_m}
+    elif region.shape == "capsule":
+        axis = np.array(region.end_m) - position
+        length_m = float(np.linalg.norm(axis))
+        shape = {
+            "shapeType": pybullet.GEOM_CAPSULE, "radius": region.radius_m, "height": length_m
+        }  # fmt: skip
+        position = position + axis / 2
+        turn = _turn_to(axis / length_m) if length_m > 0 else turn
+    elif region.shape == "sphere":
+        shape = {"shapeType": pybullet.GEOM_SPHERE, "radius": region.radius_m}
+    else:
+        shape = {
+            "shapeType": pybullet.GEOM_MESH,
+            "fileName": str(region.file),
+            "meshScale": [region.scale or 1.0] * 3,
+            "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        }
+    body: int = pybullet.createMultiBody(
+        0,
+        pybullet.createCollisionShape(**shape, physicsClientId=client),
+        -1,
+        position.tolist(),
+        turn.tolist(),
+        physicsClientId=client,
+    )
+    pybullet.setCollisionFilterGroupMask(body, -1, 0, 0, physicsClientId=client)
+    return body
+
+
+def _turn_to(direction: np.ndarray) -> np.ndarray:
+    """Return a quaternion that turns the z axis to a unit vector, (3,)."""
+    axis = np.cross(_ALONG_Z, direction)
+    sine, cosine = float(np.linalg.norm(axis)), float(direction @ _ALONG_Z)
+    if sine < 1e-12:
+        axis, sine = np.array([1.0, 0.0, 0.0]), 1.0
+        turn = np.zeros(3) if cosine > 0 else np.pi * axis
+    else:
+        turn = np.arctan2(sine, cosine) * axis / sine
+    return quaternions.turned(np.array([0.0, 0.0, 0.0, 1.0]), turn, 1.0)
