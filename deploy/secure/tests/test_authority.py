@@ -108,9 +108,7 @@ def test_a_certificate_of_another_cell_among_ones_own_is_told(authority, tmp_pat
 def test_a_file_that_is_no_certificate_is_told_with_what_to_do(authority, content) -> None:
     made = authority()
     made.certificate.write_bytes(content)
-    with pytest.raises(
-        AuthorityError, match="no certificate: make one"
-    ):
+    with pytest.raises(AuthorityError, match="no certificate: make one"):
         open_authority(made.folder)
 
 

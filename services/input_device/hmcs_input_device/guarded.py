@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import ValidationError
 
@@ -11,10 +13,10 @@ from hmcs_input_device.sources import (
     FARTHEST_M,
     FASTEST_M_S,
     DeviceSample,
-    Plays,
     Source,
     Troubled,
     at_rest,
+    plays,
     released,
 )
 
@@ -42,18 +44,19 @@ class Guarded:
     def __init__(self, source: Source, name: str) -> None:
         self._source = source
         self._name = name
-        self._plays = isinstance(source, Plays) and source.plays
+        self._plays = plays(source)
         self._gate = PressGate("the dead-man's switch", minds_hangs=not self._plays)
         self._hand: DeviceSample | None = None
         self._told: DeviceSample | None = None
         self._told_s = self._same_since_s = -float("inf")
+        self._fault = ""
         self.refusal = ""
-        """Why the last sample was not used; empty where it was."""
+        """Why what the source said last is no sample of a hand; empty where it is, or is none."""
 
     @property
     def trouble(self) -> str:
         """Why nothing moves, and what to do; empty while all is well."""
-        return self._reported() or self.refusal or self._gate.trouble
+        return self._reported() or self._fault or self._gate.trouble
 
     def sample(self, now_s: float, elapsed_s: float | None) -> DeviceSample | None:
         """Return the hand at `now_s`; None before the source has said anything of use.
@@ -61,16 +64,18 @@ class Guarded:
         `elapsed_s` as in `Source.sample`.
         """
         # Whatever a device of another distribution raises, the hand rests and the service goes on.
+        self._fault = self.refusal = ""
         try:
             told = self._checked(now_s, self._source.sample(elapsed_s))
+        except _SilentError as error:
+            self._fault = f"{self._name}: {error}"
         except _NoSampleError as error:
-            self.refusal = f"{self._name}: {error}"
+            self._fault = self.refusal = f"{self._name}: {error}"
         except Exception as error:
-            self.refusal = f"{self._name}: it failed with {type(error).__name__}: {error}"
-        else:
-            self.refusal = ""
-        if self.refusal:
-            self._gate.passes(now_s, pressed=False, trouble=self.refusal)
+            failed = f"{self._name}: it failed with {type(error).__name__} ({error})"
+            self._fault = self.refusal = f"{failed}: look after the device"
+        if self._fault:
+            self._gate.passes(now_s, pressed=False, trouble=self._fault)
             self._hand = None if self._hand is None else at_rest(self._hand)
             return self._hand
         if elapsed_s is None:
@@ -85,9 +90,9 @@ class Guarded:
         return self._source.trouble if isinstance(self._source, Troubled) else ""
 
     def _checked(self, now_s: float, told: DeviceSample | None) -> DeviceSample:
-        """Return what the source says; raises _NoSampleError where it cannot be used."""
+        """Return what the source says; raises _NoSampleError or _SilentError otherwise."""
         if told is None:
-            raise _NoSampleError("gives no samples: look after the device")
+            raise _SilentError("gives no samples: look after the device")
         try:
             motion = Motion(**told._asdict())
         except ValidationError as error:
@@ -101,11 +106,11 @@ class Guarded:
         return told
 
     def _doubt(self, now_s: float, told: DeviceSample) -> None:
-        """Raise _NoSampleError where no hand does this, or the device cannot know it now."""
+        """Raise where no hand does this, or the device cannot know it now."""
         before, before_s = self._told, self._told_s
         self._told, self._told_s = told, now_s
         if told.age_s is not None and not 0.0 <= told.age_s <= SILENT_S:
-            raise _NoSampleError("is silent: look after the device")
+            raise _SilentError("is silent: look after the device")
         for what, vector, largest, unit in (
             ("moves", told.velocity, FASTEST_M_S, "m/s"),
             ("turns", told.angular_velocity, FASTEST_RAD_S, "rad/s"),
@@ -116,7 +121,7 @@ class Guarded:
         if before is None or _differ(before, told) or not (told.dead_man and _works(told)):
             self._same_since_s = now_s
         if now_s - self._same_since_s > FROZEN_S:
-            raise _NoSampleError("has told the very same motion for long: look after the device")
+            raise _SilentError("has told the very same motion for long: look after the device")
         if before is None or not (self._gate.open and told.dead_man):
             return
         way_m = float(np.linalg.norm(np.subtract(told.position, before.position)))
@@ -126,7 +131,11 @@ class Guarded:
 
 
 class _NoSampleError(Exception):
-    """What a source says cannot be used."""
+    """What a source says is no sample of a hand."""
+
+
+class _SilentError(Exception):
+    """A source says nothing new."""
 
 
 def _works(told: DeviceSample) -> bool:
@@ -135,12 +144,10 @@ def _works(told: DeviceSample) -> bool:
 
 
 def _differ(one: DeviceSample, other: DeviceSample) -> bool:
-    return any(
-        not np.array_equal(*pair)
-        for pair in (
-            (one.position, other.position),
-            (one.velocity, other.velocity),
-            (one.orientation, other.orientation),
-            (one.wrench, other.wrench),
-        )
+    pairs: tuple[tuple[Any, Any], ...] = (
+        (one.position, other.position),
+        (one.velocity, other.velocity),
+        (one.orientation, other.orientation),
+        (one.wrench, other.wrench),
     )
+    return any(not np.array_equal(before, now) for before, now in pairs)

@@ -63,7 +63,7 @@ class HeldHandle:
         elif not np.abs(handle.position).max() <= FARTHEST_M:
             self.refusal = f"{handle.operator!r} tells a handle farther than {FARTHEST_M:g} m"
             if not another:
-                self._fault = f"the page {handle.operator!r} tells a handle out of reach: take hold"
+                self._fault = f"the page {handle.operator!r} tells a handle out of reach"
         if self.refusal:
             return False
         if not handle.dead_man:
@@ -114,9 +114,7 @@ class HeldHandle:
 
     def _holds(self, now_s: float) -> bool:
         handle = self._handle
-        return (
-            handle is not None and handle.dead_man and abs(now_s - self._heard_s) <= SILENT_S
-        )
+        return handle is not None and handle.dead_man and abs(now_s - self._heard_s) <= SILENT_S
 
 
 def _jumped(before: Handle, handle: Handle) -> bool:

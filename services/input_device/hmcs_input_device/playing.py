@@ -8,12 +8,21 @@ not held: it takes hold again when it wants to.
 
 from __future__ import annotations
 
-from hmcs_input_device.reaction import RELEASED_S
+from typing import NamedTuple
 
-TAKES_S = 2.0
-"""So long after the hand took hold again, a robot may still tell of the stop that is over."""
+from hmcs_input_device.reaction import HEARD_WITHIN_S, RELEASED_S
+
+GIVES_WAY_S = 2.0
+"""A robot that still says so long after a person ended the stop was asked to stop anew."""
 ROBOTS = 64
 """Of so many robots it is remembered that they were asked to stop."""
+
+
+class _Asked(NamedTuple):
+    """A robot that says that it was asked to stop."""
+
+    instance: str
+    heard_s: float
 
 
 class Playing:
@@ -27,9 +36,8 @@ class Playing:
         self._minds_stops = minds_stops
         self._began_s: float | None = None
         self._waits_since_s: float | None = None
-        self._on_from_s = -float("inf")
-        self._held_s: float | None = None
-        self._over: dict[str, bool] = {}
+        self._wanted_s = self._from_s = -float("inf")
+        self._asked: dict[str, _Asked] = {}
         self.stopped = ""
         """The robot that was asked to stop, so that the source waits; empty while it does not."""
 
@@ -38,53 +46,51 @@ class Playing:
         """Whether it was told to play."""
         return self._began_s is not None
 
+    @property
+    def rests(self) -> bool:
+        """Whether the hand has let go, for a stop that was asked for."""
+        return bool(self.stopped) or self._waits_since_s is not None
+
     def begin(self, now_s: float) -> None:
-        """Play from the beginning."""
-        self._began_s = now_s
-        self._on_from(now_s)
+        """Play from the beginning, once no robot says any more that it was asked to stop."""
+        self._began_s = self._waits_since_s = now_s
+        self.stopped, self._wanted_s, self._from_s = "", now_s, now_s
 
     def go_on(self, now_s: float) -> None:
         """Play on from where it waits, once everybody has seen that the hand had let go."""
-        assert self._began_s is not None
         assert self._waits_since_s is not None
-        on_from_s = now_s + RELEASED_S
-        self._began_s += on_from_s - self._waits_since_s
-        self._on_from(on_from_s)
-
-    def rests(self, now_s: float) -> bool:
-        """Whether the hand has let go for a stop that was asked for."""
-        return bool(self.stopped) or now_s < self._on_from_s
+        self.stopped, self._wanted_s = "", now_s
+        self._from_s = self._waits_since_s + RELEASED_S
 
     def elapsed_s(self, now_s: float) -> float | None:
         """Return how far it is; None before it plays."""
         if self._began_s is None:
             return None
-        at_s = max(now_s, self._on_from_s) if self._waits_since_s is None else self._waits_since_s
+        at_s = now_s if self._waits_since_s is None else self._waits_since_s
         return round((at_s - self._began_s) * self._rate_hz) / self._rate_hz
 
-    def held(self, now_s: float) -> None:
-        """Take in that the hand holds the dead-man's switch."""
-        if self._held_s is None:
-            self._held_s = now_s
+    def waited(self, now_s: float) -> None:
+        """Take in the time: it goes on where nothing is in the way any more."""
+        if self._began_s is None or self._waits_since_s is None or self.stopped:
+            return
+        for robot in self._asked.values():
+            if now_s - robot.heard_s <= HEARD_WITHIN_S:
+                if now_s - self._wanted_s > GIVES_WAY_S:
+                    self.stopped = robot.instance
+                return
+        if now_s >= self._from_s:
+            self._began_s += now_s - self._waits_since_s
+            self._waits_since_s = None
 
     def robot_told(self, now_s: float, boot: str, instance: str, *, asked: bool) -> None:
         """Take in whether a robot stands because it was asked to stop."""
-        if not self._minds_stops:
+        known = self._asked.pop(boot, None)
+        if not asked or not self._minds_stops:
             return
-        if not asked:
-            self._over.pop(boot, None)
-            return
-        begins_to_move = self._held_s is None or now_s - self._held_s <= TAKES_S
-        over = self._over.pop(boot, False) and begins_to_move
-        self._over[boot] = over
-        while len(self._over) > ROBOTS:
-            del self._over[next(iter(self._over))]
-        if not over and not self.stopped:
+        self._asked[boot] = _Asked(instance, now_s)
+        while len(self._asked) > ROBOTS:
+            del self._asked[next(iter(self._asked))]
+        if known is None and not self.stopped:
             self.stopped = instance
-            if self._began_s is not None:
-                self._waits_since_s = max(now_s, self._on_from_s)
-
-    def _on_from(self, at_s: float) -> None:
-        self.stopped, self._waits_since_s, self._held_s = "", None, None
-        self._on_from_s = at_s
-        self._over = dict.fromkeys(self._over, True)
+            if self._began_s is not None and self._waits_since_s is None:
+                self._waits_since_s = max(now_s, self._began_s)

@@ -1,4 +1,4 @@
-"""The one rule for every dead-man's switch: after any trouble only a deliberate new press counts."""
+"""One rule for every dead-man's switch: after any trouble only a deliberate new press counts."""
 
 from __future__ import annotations
 

@@ -140,6 +140,11 @@ class Troubled(Protocol):
         """Why nothing moves, and what to do; empty while all is well."""
 
 
+def plays(source: Source) -> bool:
+    """Return whether nobody's hand moves a source."""
+    return isinstance(source, Plays) and source.plays
+
+
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]
 """Makes a source; raises UserError where the settings do not let it."""
 

@@ -103,23 +103,22 @@ class DeviceSource:
             return f"{name} {problem}, so that nothing moves: plug it in anew, or use another"
         if reading != self._newest:
             self._newest, self._newest_s = reading, now_s
-        axis, silent_s = deflected(reading, self._rules), now_s - self._newest_s
-        silence = self._rules.silence
-        if held and silent_s > (silence.deflected_s if axis else silence.resting_s):
-            return f"{name} is silent while {self._rules.buttons.dead_man} is held: {self._anew}"
+        axis, silence = deflected(reading, self._rules), self._rules.silence
+        dead_man, silent_s = self._rules.buttons.dead_man, now_s - self._newest_s
         if not axis:
             self._rested_s = now_s
-        if not axis or self._gate.open:
-            return ""
         if self._rested_s is None:
             return (
-                f"{name} has not been at rest since it came, see {axis}: let go of it, or take "
-                "that axis out or widen device.dead_band"
+                f"{name} has not been at rest since it came, see {axis}, so that nothing moves: "
+                f"let go of it and of {dead_man}, then press that anew; where an axis never rests, "
+                "take it out of device.axes or widen device.dead_band"
             )
-        if held and now_s - self._rested_s > REST_WITHIN_S:
+        if held and silent_s > (silence.deflected_s if axis else silence.resting_s):
+            return f"{name} is silent while {dead_man} is held: {self._anew}"
+        if held and not self._gate.open and now_s - self._rested_s > REST_WITHIN_S:
             return (
-                f"{name} was not at rest when {self._rules.buttons.dead_man} was pressed, see "
-                f"{axis}: let go of all of it, then {self._anew}; where it drifts, widen "
-                "device.dead_band"
+                f"{name} was not at rest when {dead_man} was pressed, see {axis}, so that nothing "
+                f"moves: let go of it and of {dead_man}, then press that anew; where it drifts, "
+                "widen device.dead_band"
             )
         return ""

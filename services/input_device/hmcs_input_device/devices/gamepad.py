@@ -28,8 +28,8 @@ USUAL = Usual(
     "rate",
     AxisMap(x="y", y="-x", z="ry"),
     Buttons(dead_man="right_shoulder", clutch="left_shoulder", pedal="a"),
-    Silence(deflected_s=1.0),
     has=("x", "y", "z", "rx", "ry"),
+    silence=Silence(deflected_s=1.0),
 )
 """The left stick moves the hand over the table, the right one up and down."""
 

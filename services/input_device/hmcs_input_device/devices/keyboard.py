@@ -24,8 +24,8 @@ USUAL = Usual(
     "rate",
     AxisMap(x="y", y="-x", z="z"),
     Buttons(dead_man="ctrl_r", clutch="ctrl", pedal="shift"),
-    Silence(deflected_s=1.5),
     has=("x", "y", "z"),
+    silence=Silence(deflected_s=1.5),
     switches=True,
 )
 """The arrows move the hand over the table, page up and down lift and lower it."""

@@ -64,7 +64,7 @@ class Silence(NamedTuple):
     Of no device it is known whether it lives while it is silent; each is silent otherwise.
     """
 
-    deflected_s: float
+    deflected_s: float = 1.0
     """While it moves the hand."""
     resting_s: float = 10.0
     """While its axes are at rest: some plans move the robot all the same."""
@@ -76,9 +76,9 @@ class Usual(NamedTuple):
     kind: Kind
     axes: AxisMap
     buttons: Buttons
-    silence: Silence
     has: tuple[str, ...] = AXES
     """Axes that it has, of AXES."""
+    silence: Silence = Silence()
     switches: bool = False
     """Whether its axes are switches, which go from one end to the other at once."""
 
@@ -210,8 +210,8 @@ def deflected(reading: DeviceReading, rules: Rules) -> str:
     """Return the name and value of an axis that moves the hand and is not at rest; else empty."""
     if rules.kind == "position":
         return ""
-    for name, value, used in zip(AXES, reading.axes, rules.axes.any(axis=0), strict=True):
-        if used and abs(value) > max(rules.dead_band, LEAST_REST):
+    for name, value, column in zip(AXES, reading.axes, rules.axes.T, strict=True):
+        if column.any() and abs(value) > max(rules.dead_band, LEAST_REST):
             return f"axis {name} ({value:.2f})"
     return ""
 

@@ -14,7 +14,7 @@ import threading
 from typing import Any
 
 from hmcs_input_device.devices.desktop import check_listens, of_session
-from hmcs_input_device.devices.mapping import AxisMap, Buttons, Silence, Usual
+from hmcs_input_device.devices.mapping import AxisMap, Buttons, Usual
 from hmcs_input_device.devices.reading import AXES, DeviceReading
 from hmcs_input_device.settings import DeviceSettings
 
@@ -23,7 +23,6 @@ USUAL = Usual(
     "position",
     AxisMap(x="none", y="-x", z="y"),
     Buttons(dead_man="left", clutch="right", pedal="middle"),
-    Silence(10.0),
     has=("x", "y"),
 )
 """For the plane of a table: x of the hand is y, z is none."""

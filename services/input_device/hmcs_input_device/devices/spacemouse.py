@@ -22,7 +22,7 @@ USUAL = Usual(
     "rate",
     AxisMap(x="x", y="y", z="z"),
     Buttons(dead_man="left", clutch="right", pedal="menu"),
-    Silence(deflected_s=SILENT_S),
+    silence=Silence(deflected_s=SILENT_S),
 )
 """One with two buttons only has no pedal; one without a left button needs another dead-man."""
 
