@@ -385,14 +385,29 @@ def mark(
 def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     """Let every robot stand, whoever drives it, until its operator lets go and takes hold again.
 
-    All are asked at once. The exit code is 0 where every robot that is present says that it stands,
-    else 1.
+    An operator that is played or simulated waits for `hmcs play`. All robots are asked at once. The
+    exit code is 0 where every one that is present says that it stands, else 1.
     """
     from hmcs_local.asking import stop_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
         replies = stop_everybody(bus)
+    raise typer.Exit(_told(replies))
+
+
+@app.command()
+def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+    """Let an operator that is played or simulated begin, or go on where it let go for a stop.
+
+    The exit code is 0 where every input device has done it, else 1.
+    """
+    from hmcs.bus.messages import Ask
+    from hmcs_local.asking import ask_everybody
+    from hmcs_local.observer import open_observer
+
+    with open_observer(router, cell) as bus:
+        replies = ask_everybody(bus, "input_device", "play", Ask())
     raise typer.Exit(_told(replies))
 
 

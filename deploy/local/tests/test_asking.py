@@ -123,6 +123,7 @@ def announce(observer: Bus, service: str, name: str) -> None:
     ("words", "service", "verb", "body"),
     [
         (("stop",), "robot", "stop", Ask()),
+        (("play",), "input_device", "play", Ask()),
         (("cancel",), "trainer", "cancel", Ask()),
         (("record", "take-1"), "recorder", "record", Record(on=True, name="take-1")),
         (("record", "--stop"), "recorder", "record", Record(on=False)),
@@ -153,7 +154,12 @@ def test_what_is_asked_for_is_carried_out_by_all_and_told(
 
 @pytest.mark.parametrize(
     ("word", "service", "question"),
-    [("stop", "robot", Ask), ("cancel", "trainer", Ask), ("record", "recorder", Record)],
+    [
+        ("stop", "robot", Ask),
+        ("play", "input_device", Ask),
+        ("cancel", "trainer", Ask),
+        ("record", "recorder", Record),
+    ],
 )
 def test_one_that_refuses_or_is_a_name_only_keeps_nobody_else_from_doing_it(
     hmcs: Any,

@@ -160,7 +160,10 @@ class Robot(Service):
             raise RequestRefusedError(
                 "the control process does not take the stop: it hangs or has ended. Cut the power"
             )
-        return Done(detail="stands until the operator lets go and takes hold again")
+        return Done(
+            detail="stands until the operator lets go and takes hold again; an operator that is "
+            "played or simulated waits for `hmcs play`"
+        )
 
     def _on_stop_request(self, received: Received[StopRequest]) -> None:
         source = received.envelope.source
