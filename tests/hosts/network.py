@@ -1,7 +1,7 @@
 """Hosts of a test's own on this machine: network namespaces, joined by links that can be spoiled.
 
-Every two hosts have a link of their own, with a delay and losses. The test itself looks at each host
-over a link that nothing is ever done to.
+Every two hosts have a link of their own, with a delay and losses. The test itself looks at each
+host over a link that nothing is ever done to.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class Arm:
             np.array([info[9] for info in turning]),
             np.array(speeds, dtype=float),
         )
-        self._link_names = {info[0]: info[12].decode() for info in infos}
+        self._link_names: dict[int, str] = {info[0]: info[12].decode() for info in infos}
         self._movable = len(movable)
         self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
         self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
