@@ -97,7 +97,8 @@ def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
     replies = {reply.member: reply for reply in by_name}
     for answer in of_all.result() if of_all.exception() is None else ():
         member = _sender(answer)
-        if possible(member) and not (member in replies and replies[member].done):
+        is_robot = member.service == "robot" and possible(member)
+        if is_robot and not (member in replies and replies[member].done):
             replies[member] = Reply(member, True, answer.body.detail)
     if not replies:
         raise _nobody(bus, "robot", there.strangers)

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import Ask, Belief, Description
+from hmcs.bus.presence import possible
 from hmcs.bus.session import Bus, Received, RequestRefusedError
-from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.shown import plain
@@ -110,26 +110,31 @@ def active_model(bus: Bus) -> str:
 
     Raises DeployError where there is no fixture controller, or several follow different ones.
     """
-    key = bus.keys.rpc("fixture_controller", ANY, "describe")
-    answers = bus.ask(key, Ask(), Description)
-    if not answers:
+    followed = _followed(bus)
+    if not followed:
         raise DeployError(
             f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
         )
-    followed = {
-        answer.envelope.source.instance: answer.body.facts.get("active_model", "")
-        for answer in answers
-    }
     if len(set(followed.values())) > 1:
         told = ", ".join(
-            f"{plain(instance)} {plain(model) or 'none'}"
-            for instance, model in sorted(followed.items())
+            f"{fixture} {plain(model) or 'none'}" for fixture, model in sorted(followed.items())
         )
         raise DeployError(
             f"fixture controllers follow different models ({told}): let all follow one first, by "
             "`hmcs swap --activate MODEL`"
         )
-    return answers[0].body.facts.get("active_model", "")
+    return next(iter(followed.values()))
+
+
+def _followed(bus: Bus) -> dict[str, str]:
+    """Return the model that each fixture controller follows, empty for none, by instance."""
+    answers = bus.ask(bus.keys.rpc("fixture_controller", ANY, "describe"), Ask(), Description)
+    return {
+        source.instance: answer.body.facts.get("active_model", "")
+        for answer in answers
+        if (source := answer.envelope.source).service == "fixture_controller"
+        and possible(Member(source.service, source.instance))
+    }
 
 
 def watched(bus: Bus, active: str, newcomer: str, watch_s: float) -> Agreement:
@@ -214,8 +219,8 @@ def _shadow(
 
     def is_followed() -> bool:
         try:
-            return active_model(bus) == model.name
-        except (UserError, RequestRefusedError):
+            return model.name in _followed(bus).values()
+        except Exception:  # who cannot be asked follows nobody
             return False
 
     command = [sys.executable, "-m", f"hmcs_{SERVICE}", "--model", path]

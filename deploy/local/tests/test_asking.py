@@ -12,7 +12,7 @@ import pytest
 import zenoh
 
 from hmcs.bus.config import BusSettings
-from hmcs.bus.keys import ANY
+from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import (
     Ask,
     Done,
@@ -123,6 +123,7 @@ def announce(observer: Bus, service: str, name: str) -> None:
     ("words", "service", "verb", "body"),
     [
         (("stop",), "robot", "stop", Ask()),
+        (("play",), "input_device", "play", Ask()),
         (("cancel",), "trainer", "cancel", Ask()),
         (("record", "take-1"), "recorder", "record", Record(on=True, name="take-1")),
         (("record", "--stop"), "recorder", "record", Record(on=False)),
@@ -153,7 +154,12 @@ def test_what_is_asked_for_is_carried_out_by_all_and_told(
 
 @pytest.mark.parametrize(
     ("word", "service", "question"),
-    [("stop", "robot", Ask), ("cancel", "trainer", Ask), ("record", "recorder", Record)],
+    [
+        ("stop", "robot", Ask),
+        ("play", "input_device", Ask),
+        ("cancel", "trainer", Ask),
+        ("record", "recorder", Record),
+    ],
 )
 def test_one_that_refuses_or_is_a_name_only_keeps_nobody_else_from_doing_it(
     hmcs: Any,
@@ -293,22 +299,31 @@ def test_a_robot_that_cannot_be_reached_yet_is_asked_again(
     assert result[0].all_done
 
 
+@pytest.mark.parametrize(
+    ("service", "instance"), [("robot", "other"), ("attacker", "a"), ("attacker", "x")]
+)
 def test_one_that_answers_in_a_robots_place_is_not_that_robot(
-    router: str, observer: Bus, robot: Callable[..., Asked], seen: Callable[[int], None]
+    router: str,
+    observer: Bus,
+    robot: Callable[..., Asked],
+    seen: Callable[[int], None],
+    service: str,
+    instance: str,
 ) -> None:
     robot("a", hangs=True)
     key = observer.keys.rpc("robot", "a", "stop")
 
     def pretend(query: zenoh.Query) -> None:
-        source = Source(service="robot", instance="other", boot="b")
+        source = Source(service=service, instance=instance, boot="b")
         with query:
             query.reply(key, encode(Done(detail="stands"), Envelope(source=source, seq=0)))
 
     with open_observer(router, CELL) as stranger:
         stranger._declared.append(stranger._session.declare_queryable(key, pretend))
         seen(1)
-        replies = {str(r.member.instance): r.done for r in stop_everybody(observer, 0.5).each}
-    assert replies["a"] is False
+        replies = {r.member: r.done for r in stop_everybody(observer, 0.5).each}
+    assert replies.pop(Member("robot", "a")) is False
+    assert all(member.service == "robot" for member in replies)
 
 
 def test_trouble_with_one_robot_is_told_as_its_own(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -114,6 +115,29 @@ def test_labels_there_are_already_are_held_to_the_task(hmcs: Run, take: Path) ->
     code, _, error = hmcs("label", take, "--task", "lines-through-obstacles")
     assert code == 2
     assert "'fly' from 0.100 s to 0.200 s" in error
+
+
+@pytest.mark.parametrize("name", ["[red]", "[/x]", "a\x1b[2Jb", "\u202egnp"])
+def test_names_in_a_recording_are_text_and_nothing_a_terminal_obeys(
+    hmcs: Run, tmp_path: Path, name: str
+) -> None:
+    take = Maker(tmp_path / "takes").write(list(hand_of((name, "carry"), 100)))
+    shown = name.encode("unicode_escape").decode()
+    for word in ("label", "inspect"):
+        _, out, err = hmcs(word, take)
+        assert not err
+        assert out.replace("\n", "").isprintable()
+        assert shown in out
+    _, out, _ = hmcs("inspect", take, "--json")
+    assert out.removesuffix("\n").isprintable()
+    assert json.loads(out)["labels"] == [name, "carry"]
+
+
+def test_an_error_that_quotes_a_file_is_text(hmcs: Run, tmp_path: Path) -> None:
+    code, _, err = hmcs("inspect", tmp_path / "\x1b[2Jnone.mcap")
+    assert code == 2
+    assert "\\x1b[2Jnone.mcap" in err
+    assert err.replace("\n", "").isprintable()
 
 
 def test_labels_of_another_recording_are_told_and_kept_aside(hmcs: Run, take: Path) -> None:

@@ -33,9 +33,10 @@ from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
-from hmcs_console.seeing.presence import MOST_TOKENS, Presence
+from hmcs_console.seeing.presence import Presence
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.gateway import Gateway, Served, encryption
+from hmcs_console.serving.encryption import encryption
+from hmcs_console.serving.gateway import Gateway, Served
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
@@ -90,9 +91,7 @@ class Console(Service):
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
         try:
-            self._gateway = Gateway(
-                served(settings), self.page.server.get_port(), log, self._count_refused
-            )
+            self._gateway = Gateway(served(settings), self.page.server, log, self._count_refused)
         except BaseException:
             self.page.close()
             self._asking.close()
@@ -208,10 +207,8 @@ class Console(Service):
         self._stopping.take()
 
     def _stop_everybody(self) -> None:
-        members = self._seen.members
-        robots = [member for member in members if member.service == "robot"]
-        crowded = len(members) >= MOST_TOKENS
-        self._stopping.stop_everybody(robots, self._tell, crowded=crowded)
+        robots = [member for member in self._seen.members if member.service == "robot"]
+        self._stopping.stop_everybody(robots, self._tell)
 
     def _show(self) -> None:
         now_s = time.monotonic()

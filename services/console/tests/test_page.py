@@ -75,6 +75,13 @@ def browser(cell: Any) -> ClientConnection:
         compression=None,
         max_size=None,
     )
+    camera(connection)
+    cell.until(lambda: cell.service.page._handles, "its handle")
+    return connection
+
+
+def camera(connection: ClientConnection) -> None:
+    """Say from where the first page looks, which is what makes it one."""
     axis = (0.0, 0.0, 1.0)
     turn = (1.0, 0.0, 0.0, 0.0)
     tell(
@@ -83,8 +90,6 @@ def browser(cell: Any) -> ClientConnection:
         **{"wxyz": turn, "position": axis, "look_at": axis, "up_direction": axis},
         **{"fov": 1.0, "near": 0.1, "far": 9.0, "image_height": 9, "image_width": 9},
     )
-    cell.until(lambda: cell.service.page._handles, "its handle")
-    return connection
 
 
 def tell(connection: ClientConnection, what: str, **fields: Any) -> None:
@@ -97,6 +102,31 @@ def drag(connection: ClientConnection, place: tuple[Any, ...], *phases: str) -> 
         pose = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": place} if phase == "Update" else {}
         message = f"TransformControls{phase}Message"
         tell(connection, message, name="/handle", owner="0", **pose)
+
+
+def test_the_pages_own_server_hears_nobody_but_the_door(make_cell: MakeCell) -> None:
+    cell = make_cell(lease_s=2.0)
+    page = cell.service.page
+    with browser(cell):
+        stranger = connect(
+            f"ws://127.0.0.1:{page.server.get_port()}",
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            compression=None,
+            max_size=None,
+        )
+
+        def drag_until_closed() -> None:
+            camera(stranger)
+            drag(stranger, (0.6, 0.0, 0.25), "Update", "DragStart")
+            while True:
+                stranger.recv(timeout=10.0)
+
+        with stranger, pytest.raises(ConnectionClosed):
+            drag_until_closed()
+        cell.wait(0.2)
+        assert page.viewers == 1
+        assert len(page._handles) == 1
+        assert not cell.handles
 
 
 def test_a_burst_of_a_browser_is_cut_and_its_last_position_and_release_come_through(

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.errors import UserError
 from hmcs.motion.quaternions import product, rotation_matrix
-from hmcs_input_device.sources import DeviceSample
+from hmcs_input_device.settings import InputDeviceSettings
+from hmcs_input_device.sources import DeviceSample, SeesRobot, Source
 
 FloatArray = NDArray[np.float64]
+
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+"""No turn."""
 
 
 class TaskFrame:
@@ -38,3 +45,20 @@ class TaskFrame:
 
     def _turned(self, vector: FloatArray | None) -> FloatArray | None:
         return None if vector is None else self._rotation @ vector
+
+
+def frame_of(
+    settings: InputDeviceSettings, source: Source
+) -> Callable[[DeviceSample], DeviceSample]:
+    """Return what tells a source's samples along the axes of the robot's base.
+
+    Raises UserError for a source that has them already.
+    """
+    if settings.task_frame_xyzw == IDENTITY:
+        return lambda sample: sample
+    if isinstance(source, SeesRobot):
+        raise UserError(
+            f"task_frame_xyzw: the operator of {settings.source!r} sees the robot in its base "
+            "frame: leave it out"
+        )
+    return TaskFrame(settings.task_frame_xyzw).in_base

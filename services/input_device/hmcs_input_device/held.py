@@ -7,24 +7,28 @@ from numpy.typing import NDArray
 
 from hmcs.bus.messages import Handle
 from hmcs.task import Task
+from hmcs_input_device.press_gate import SILENT_S, PressGate
 from hmcs_input_device.settings import InputDeviceSettings
-from hmcs_input_device.sources import LIVE, DeviceSample
+from hmcs_input_device.sources import FARTHEST_M, LIVE, DeviceSample
 
 FloatArray = NDArray[np.float64]
 
 RATE_HZ = 100.0
-SILENT_S = 0.15
-"""A page that says nothing for so long has closed, hangs or is cut off: the dead-man is up."""
 FOLLOW_S = 0.08
 """Time constant with which the hand follows the handle: a page tells its place in jerks."""
 FASTEST_M_S = 0.5
-"""A handle that jumps is followed no faster."""
+"""A handle that goes faster is followed no faster."""
+JUMP_M = 2.0
+"""A handle that goes farther from one message to the next was not moved there by a hand."""
 
 
 class HeldHandle:
     """The hand that holds a page's handle, one operator at a time.
 
-    The hand is its own integral: where the handle is pressed anew, the hand does not jump there.
+    The hand is its own integral: where the handle is pressed anew, the hand does not jump there. A
+    page that closes, hangs or is cut off is silent: the dead-man is up until its operator is seen
+    to let go and to take hold anew. So it is after a page's handle jumped, and where a page was
+    first heard while its handle was held.
     """
 
     rate_hz = RATE_HZ
@@ -32,43 +36,75 @@ class HeldHandle:
     reach_m = None
 
     def __init__(self) -> None:
-        self._operator = ""
+        self._gate = PressGate("the handle")
         self._handle: Handle | None = None
         self._heard_s = -float("inf")
+        self._let_go = False
+        self._fault = ""
         self._hand = np.zeros(3)
         self._offset: FloatArray | None = None
         self._sampled_s: float | None = None
         self._elapsed_s = 0.0
+        self.refusal = ""
+        """Why the last handle was refused."""
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing moves, and what to do; empty while all is well."""
+        return self._gate.trouble
 
     def handled(self, now_s: float, handle: Handle) -> bool:
-        """Take in what a page says; False where another operator's page holds the lease."""
-        another = handle.operator != self._operator
-        if another and self._operator and self._holds(now_s):
+        """Take in what a page says; False where it is refused, see `refusal`."""
+        before = self._handle
+        another = before is None or handle.operator != before.operator
+        self.refusal = ""
+        if another and self._holds(now_s):
+            self.refusal = f"{handle.operator!r} does not operate: another page holds the handle"
+        elif not np.abs(handle.position).max() <= FARTHEST_M:
+            self.refusal = f"{handle.operator!r} tells a handle farther than {FARTHEST_M:g} m"
+            if not another:
+                self._fault = f"the page {handle.operator!r} tells a handle out of reach"
+        if self.refusal:
             return False
+        if not handle.dead_man:
+            self._let_go = True
+        elif another:
+            self._fault = f"the page {handle.operator!r} held its handle when it was first heard"
+        elif before is not None and before.dead_man and _jumped(before, handle):
+            self._fault = f"the handle of the page {handle.operator!r} jumped"
         if another or not handle.dead_man or handle.clutch:
             self._offset = None
-        self._operator, self._handle, self._heard_s = handle.operator, handle, now_s
+        self._handle, self._heard_s = handle, now_s
         return True
 
     def seconds(self, now_s: float) -> None:
-        """Be told the time of the next sample, by the clock of `handled`."""
+        """Set the time of the next sample, by the clock of `handled`."""
         elapsed_s = 0.0 if self._sampled_s is None else max(now_s - self._sampled_s, 0.0)
         self._sampled_s = now_s
-        self._elapsed_s = min(elapsed_s, 0.1)
+        self._elapsed_s = min(elapsed_s, FOLLOW_S)
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
         """Return the hand now; at rest, with the dead-man up, while nobody holds the handle."""
         now_s, handle = self._sampled_s, self._handle
-        if now_s is None or handle is None or not self._holds(now_s):
+        if now_s is None or handle is None:
+            return DeviceSample(self._hand, np.zeros(3), dead_man=False)
+        trouble, self._fault = self._fault, ""
+        if not trouble and handle.dead_man and not self._holds(now_s):
+            trouble = f"the page {handle.operator!r} fell silent while its handle was held"
+        # Let go of and taken hold of anew between two samples, it was let go of all the same.
+        pressed, self._let_go = handle.dead_man and not self._let_go, False
+        remedy = ": let go of the handle and take hold of it anew" if trouble else ""
+        if not self._gate.passes(now_s, pressed, trouble + remedy):
             self._offset = None
-            pedal = handle is not None and handle.pedal
+            pedal = handle.pedal and not trouble
             return DeviceSample(self._hand, np.zeros(3), dead_man=False, pedal=pedal)
         if self._offset is None:
             self._offset = self._hand - handle.position
         wanted = (handle.position + self._offset - self._hand) / FOLLOW_S
         speed = float(np.linalg.norm(wanted))
         velocity = wanted * min(1.0, FASTEST_M_S / speed) if speed > 0 else wanted
-        self._hand = self._hand + velocity * min(self._elapsed_s, FOLLOW_S)
+        hand = self._hand + velocity * self._elapsed_s
+        self._hand = np.clip(hand, -FARTHEST_M, FARTHEST_M)
         return DeviceSample(
             self._hand, velocity, dead_man=True, clutch=handle.clutch, pedal=handle.pedal
         )
@@ -78,7 +114,11 @@ class HeldHandle:
 
     def _holds(self, now_s: float) -> bool:
         handle = self._handle
-        return handle is not None and handle.dead_man and now_s - self._heard_s <= SILENT_S
+        return handle is not None and handle.dead_man and abs(now_s - self._heard_s) <= SILENT_S
+
+
+def _jumped(before: Handle, handle: Handle) -> bool:
+    return bool(np.linalg.norm(handle.position - before.position) > JUMP_M)
 
 
 def page(settings: InputDeviceSettings, task: Task) -> HeldHandle:

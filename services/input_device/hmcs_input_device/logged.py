@@ -21,6 +21,8 @@ LEAST_RATE_HZ, MOST_RATE_HZ = 30.0, 1000.0
 class Logged:
     """Plays the samples of a recording once; at rest, with the dead-man released, around that."""
 
+    plays = True
+
     def __init__(
         self, times_s: Sequence[float], motions: Sequence[Motion], lead_in_s: float
     ) -> None:

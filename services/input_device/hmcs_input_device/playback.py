@@ -42,6 +42,8 @@ class Playback:
     when it has played, the device is at rest with the dead-man released, and nobody pushes it.
     """
 
+    plays = True
+
     def __init__(self, demonstration: Demonstration, passes: Passes) -> None:
         time_s = (demonstration.time_s - demonstration.time_s[0]) / passes.speed
         self._times_s: list[float] = time_s.tolist()

@@ -85,6 +85,8 @@ class ReEngaging:
     does not jump.
     """
 
+    plays = True
+
     def __init__(self, playback: Playback, reaction: Reaction) -> None:
         self.reaction = reaction
         self._playback = playback

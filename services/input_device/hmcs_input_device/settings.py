@@ -65,6 +65,11 @@ class DeviceSettings(_Part):
     """How far the hand goes while the pointer of a mouse goes a pixel."""
     jump_pixels: float = Field(default=200.0, gt=0.0)
     """A pointer that goes farther from one reading to the next moves nothing by it."""
+    deflected_silence_s: float | None = Field(default=None, gt=0.0, le=60.0)
+    """A device that says nothing for so long while it moves the hand counts as lost; by default as
+    is usual for it."""
+    resting_silence_s: float | None = Field(default=None, gt=0.0, le=600.0)
+    """The same while its dead-man is held and its axes are at rest."""
 
 
 class InputDeviceSettings(ServiceSettings):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.leading import LeadingHand
-from hmcs_input_device.reaction import Reaction
+from hmcs_input_device.reaction import HEARD_WITHIN_S, Reaction
 from hmcs_input_device.sources import LIVE, DeviceSample
 
 FloatArray = NDArray[np.float64]
@@ -20,8 +20,10 @@ class Simulated:
     """One performance by a `ClosedLoopOperator`, with a hand of their own or on the robot's tool.
 
     The hand rests with the dead-man released before it and after it, and while nobody knows where
-    the robot is.
+    the robot is: before it was heard, and when it has been silent.
     """
+
+    plays = True
 
     def __init__(
         self,
@@ -41,6 +43,8 @@ class Simulated:
         self._operator = operator
         self._lead_in_s = lead_in_s
         self._robot: tuple[FloatArray, FloatArray] | None = None
+        self._seen_anew = False
+        self._seen_s = 0.0
         self._leading = leading
         self._hand = np.zeros(3)
         self._made = 0
@@ -56,7 +60,7 @@ class Simulated:
 
     def sees(self, position: FloatArray, orientation: FloatArray) -> None:
         """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
-        self._robot = position, orientation
+        self._robot, self._seen_anew = (position, orientation), True
         if self._leading is not None:
             self._hand = position
 
@@ -67,6 +71,9 @@ class Simulated:
             return resting
         if self._robot is None:
             self._lead_in_s = elapsed_s
+            return resting
+        if self._unseen(elapsed_s):
+            self._made = self._due(elapsed_s)
             return resting
         if self.reaction is not None and self.reaction.lets_go(elapsed_s, pressing=True):
             self._made = self._due(elapsed_s)
@@ -91,6 +98,12 @@ class Simulated:
 
     def close(self) -> None:
         """Nothing is held."""
+
+    def _unseen(self, elapsed_s: float) -> bool:
+        """Whether the robot was not seen for so long that nobody knows where it is."""
+        if self._seen_anew:
+            self._seen_anew, self._seen_s = False, elapsed_s
+        return elapsed_s - self._seen_s > HEARD_WITHIN_S
 
     def _due(self, elapsed_s: float) -> int:
         return round((elapsed_s - self._lead_in_s) * self.rate_hz) + 1

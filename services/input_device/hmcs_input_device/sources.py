@@ -31,6 +31,10 @@ ENTRY_POINTS = "hmcs.input_sources"
 """Group of the entry points that name sources."""
 LIVE = math.inf
 """Duration of a source that has no end."""
+FARTHEST_M = 1e4
+"""No hand is farther from its zero, along any axis."""
+FASTEST_M_S = 5.0
+"""No hand moves faster."""
 
 
 class DeviceSample(NamedTuple):
@@ -49,10 +53,29 @@ class DeviceSample(NamedTuple):
     """rad/s, shape (3,)."""
     wrench: FloatArray | None = None
     """N and N·m, shape (6,)."""
+    age_s: float | None = None
+    """How long ago the device reported this; None where the source cannot know. A device whose
+    reports stay out is no longer believed."""
+
+
+def released(sample: DeviceSample) -> DeviceSample:
+    """Return a sample of the same hand, still, with the dead-man up."""
+    turning = None if sample.angular_velocity is None else np.zeros(3)
+    return sample._replace(velocity=np.zeros(3), angular_velocity=turning, dead_man=False)
+
+
+def at_rest(sample: DeviceSample) -> DeviceSample:
+    """Return a sample of the same hand at rest, that touches nothing."""
+    wrench = None if sample.wrench is None else np.zeros(6)
+    return released(sample)._replace(clutch=False, pedal=False, wrench=wrench)
 
 
 class Source(Protocol):
-    """A device, or something that plays one."""
+    """A device, or something that plays one.
+
+    It tells what it sees of the device and judges nothing: whether a press of the dead-man counts,
+    and what becomes of nonsense, is decided in one place for all (`guarded`).
+    """
 
     @property
     def rate_hz(self) -> float:
@@ -67,7 +90,7 @@ class Source(Protocol):
         """How far its motion goes from where it begins; None where nobody can know."""
 
     def sample(self, elapsed_s: float | None) -> DeviceSample | None:
-        """Return the device as it is now; None where it has nothing to say.
+        """Return the device as it is now; None where it has nothing to say: the hand then rests.
 
         `elapsed_s` counts from the moment it was told to play; None before. It must not wait.
         """
@@ -89,10 +112,23 @@ class HearsHandle(Protocol):
     """A source that is the handle of a page."""
 
     def handled(self, now_s: float, handle: Handle) -> bool:
-        """Take in what a page says; False where another operator's page holds the lease."""
+        """Take in what a page says; False where it is refused, see `refusal`."""
+
+    @property
+    def refusal(self) -> str:
+        """Why the last one was refused."""
 
     def seconds(self, now_s: float) -> None:
-        """Be told the time of the next sample, by the clock of `handled`."""
+        """Set the time of the next sample, by the clock of `handled`."""
+
+
+@runtime_checkable
+class Plays(Protocol):
+    """A source that says whether it plays: whether nobody's hand moves it."""
+
+    @property
+    def plays(self) -> bool:
+        """True where nobody presses the dead-man: a stop that was asked for is not undone by it."""
 
 
 @runtime_checkable
@@ -102,6 +138,11 @@ class Troubled(Protocol):
     @property
     def trouble(self) -> str:
         """Why nothing moves, and what to do; empty while all is well."""
+
+
+def plays(source: Source) -> bool:
+    """Return whether nobody's hand moves a source."""
+    return isinstance(source, Plays) and source.plays
 
 
 SourceFactory = Callable[[InputDeviceSettings, Task], Source]

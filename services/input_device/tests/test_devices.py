@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from itertools import count
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -16,13 +17,14 @@ from hmcs.errors import UserError
 from hmcs.task import load_task
 from hmcs_input_device import service as service_module
 from hmcs_input_device.devices.detect import found
-from hmcs_input_device.devices.device_source import DeviceSource
+from hmcs_input_device.devices.device_source import REST_WITHIN_S, DeviceSource
 from hmcs_input_device.devices.keyboard import Keyboard
 from hmcs_input_device.devices.kinds import KINDS
 from hmcs_input_device.devices.mapping import FOLLOW_S, AxisMap, Buttons, Usual, rules_of
 from hmcs_input_device.devices.mouse import Mouse
 from hmcs_input_device.devices.reading import DeviceReading, UnpluggedError
 from hmcs_input_device.played import BUILT_IN
+from hmcs_input_device.press_gate import HANG_S, SILENT_S
 from hmcs_input_device.settings import DeviceSettings, InputDeviceSettings
 from hmcs_input_device.sources import DeviceSample, Troubled, open_source
 
@@ -53,11 +55,13 @@ class Fake:
 class Desk:
     """A device asked a hundred times a second."""
 
-    def __init__(self, usual: Usual = STICK, **settings: Any) -> None:
+    def __init__(
+        self, usual: Usual = STICK, comes_at: tuple[float, ...] = (), **settings: Any
+    ) -> None:
         self.device, self.now_s = Fake(), 5.0
         rules = rules_of(DeviceSettings(**settings), usual)
         self.source = DeviceSource(self.device, rules, lambda: self.now_s)
-        self.tell()
+        self.tell(*comes_at)
 
     def tell(
         self,
@@ -145,11 +149,12 @@ def test_a_reading_that_is_no_number_stops_the_hand_is_told_and_leaves_no_trace(
     desk.hold()
     here = desk.tell(0.5, press="hold", times=5).position
     refused = desk.tell(0.5, value, press="hold")
-    assert refused.dead_man
+    assert not refused.dead_man
     np.testing.assert_array_equal(refused.velocity, np.zeros(3))
     np.testing.assert_array_equal(refused.position, here)
     assert f"tells {value} for its axis y" in desk.source.trouble
-    assert not desk.tell(0.5, value).dead_man
+    assert not desk.tell(press="hold", times=100).dead_man
+    assert "let go of it and press it anew" in desk.source.trouble
     desk.hold()
     assert desk.tell(0.5, press="hold").velocity[0] > 0
     assert desk.source.trouble == ""
@@ -176,6 +181,22 @@ def test_a_jump_moves_nothing_until_it_stays() -> None:
     np.testing.assert_array_equal(desk.tell(0.6, press="hold").velocity, np.zeros(3))
     assert desk.tell(0.6, press="hold").velocity[0] > 0
     np.testing.assert_array_equal(desk.tell(-0.6, press="hold").velocity, np.zeros(3))
+    assert desk.tell(-0.6, press="hold").velocity[0] < 0
+
+
+def test_an_axis_that_goes_from_end_to_end_at_once_is_broken_unless_it_is_a_switch() -> None:
+    desk = Desk()
+    desk.hold()
+    desk.tell(1.0, press="hold", times=5)
+    broken = desk.tell(-1.0, press="hold")
+    assert not broken.dead_man
+    assert "jumped by 2.00" in desk.source.trouble
+    assert not desk.tell(-1.0, press="hold", times=5).dead_man
+    keys = Desk(STICK._replace(switches=True))
+    keys.hold()
+    keys.tell(1.0, press="hold", times=5)
+    keys.tell(-1.0, press="hold")
+    assert keys.tell(-1.0, press="hold").velocity[0] < 0
 
 
 def test_a_process_that_hung_does_not_make_up_for_it() -> None:
@@ -184,6 +205,140 @@ def test_a_process_that_hung_does_not_make_up_for_it() -> None:
     here = desk.tell(1.0, press="hold").position
     desk.now_s += 10.0
     assert np.linalg.norm(desk.ask().position - here) <= 0.1 * FOLLOW_S + 1e-12
+
+
+@pytest.mark.parametrize("jump_s", [HANG_S + 0.01, 10.0, -10.0])
+def test_after_a_hang_or_a_jump_of_the_clock_the_dead_man_has_to_be_pressed_anew(
+    jump_s: float,
+) -> None:
+    desk = Desk()
+    desk.hold()
+    here = desk.tell(0.5, press="hold", times=10).position
+    desk.now_s += jump_s
+    assert not desk.tell(0.51, press="hold").dead_man
+    # Let go of and pressed meanwhile: what queued up in the hang is not believed.
+    desk.hold()
+    still = desk.tell(0.01, press="hold", times=round(1.0 / PERIOD_S))
+    assert not still.dead_man
+    assert "hung or its clock jumped" in desk.source.trouble
+    np.testing.assert_array_equal(still.position, here)
+    desk.hold()
+    assert desk.tell(0.5, press="hold").velocity[0] > 0
+
+
+# --- axes that do not rest ------------------------------------------------------------------------
+
+
+def assert_stays(desk: Desk, *axes: float, seconds: float = 0.9) -> None:
+    """The hand does not move while the dead-man is held: less long than silence is told of."""
+    here = desk.source.sample(desk.now_s).position
+    still = desk.tell(*axes, press="hold", times=round(seconds / PERIOD_S))
+    assert not still.dead_man
+    np.testing.assert_array_equal(still.position, here)
+
+
+@pytest.mark.parametrize("rest", [0.99, -1.0, 1.0, 0.12, -0.2])
+def test_an_axis_that_was_never_at_rest_moves_nothing_and_is_named(rest: float) -> None:
+    """A gamepad before it is touched, a throttle or trigger that rests at an end, a worn stick."""
+    desk = Desk(comes_at=(0.0, rest))
+    assert f"has not been at rest since it came, see axis y ({rest:.2f})" in desk.source.trouble
+    assert_stays(desk, 0.0, rest)
+    assert_stays(desk, 0.5, rest)
+    desk.tell()
+    assert desk.source.trouble == ""
+    desk.hold()
+    assert desk.tell(0.5, press="hold").velocity[0] > 0
+
+
+def test_a_trigger_that_rests_at_an_end_moves_nothing_also_after_it_was_pulled() -> None:
+    desk = Desk()
+    pulled = [*np.linspace(-1, 1, 21), *np.linspace(1, -1, 21)]
+    for press in ("", "hold", ""):
+        for value in pulled:
+            desk.tell(float(value), press=press)
+        desk.tell(-1.0, times=round(2 * REST_WITHIN_S / PERIOD_S))
+        assert_stays(desk, -1.0)
+        assert "was not at rest when hold was pressed, see axis x (-1.00)" in desk.source.trouble
+        desk.tell(-1.0)
+
+
+def test_a_stick_that_drifts_after_it_was_let_go_of_moves_nothing_and_says_what_to_do() -> None:
+    desk = Desk()
+    desk.hold()
+    desk.tell(1.0, press="hold", times=10)
+    for drift in np.linspace(0.0, 0.15, 200):
+        desk.tell(float(drift))
+    desk.tell(0.15, times=100)
+    assert desk.source.trouble == ""
+    assert_stays(desk, 0.15)
+    assert "where it drifts, widen device.dead_band" in desk.source.trouble
+
+
+@pytest.mark.parametrize("dead_band", [0.0, 0.1])
+def test_pressing_the_dead_man_may_push_the_stick(dead_band: float) -> None:
+    desk = Desk(dead_band=dead_band)
+    desk.tell(0.04)
+    assert desk.tell(0.3, press="hold").dead_man
+    assert desk.tell(0.3, press="hold").velocity[0] > 0
+    late = Desk()
+    late.tell(0.5, times=round(0.8 * REST_WITHIN_S / PERIOD_S))
+    assert late.tell(0.5, press="hold").dead_man
+
+
+def test_an_axis_that_moves_nothing_may_be_anywhere() -> None:
+    desk = Desk(comes_at=(0.0, 0.0, 0.0, 1.0, -1.0, 0.7))
+    desk.tell(0.0, 0.0, 0.0, 1.0, -1.0, 0.7)
+    desk.tell(0.0, 0.0, 0.0, 1.0, -1.0, 0.7, press="hold")
+    assert desk.tell(0.5, 0.0, 0.0, 1.0, -1.0, 0.7, press="hold").velocity[0] > 0
+    assert desk.source.trouble == ""
+
+
+# --- devices that fall silent ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("axis", "silence_s"), [(0.5, 0.3), (0.0, 4.0)], ids=["deflected", "at rest"]
+)
+@pytest.mark.parametrize("tells_reports", [True, False])
+def test_a_device_whose_last_values_stand_for_ever_is_let_go_of_and_has_to_be_pressed_anew(
+    axis: float, silence_s: float, tells_reports: bool
+) -> None:
+    desk = Desk(deflected_silence_s=0.3, resting_silence_s=4.0)
+    desk.hold()
+    report = 0.0
+    for k in range(round(2 * silence_s / PERIOD_S)):
+        # Where the library tells no reports, a hand that trembles shows that it lives.
+        report, shown = report + 1.0, axis + (0.0 if tells_reports else 0.001 * (k % 2))
+        reading = DeviceReading((shown,) + (0.0,) * 5, frozenset({"hold"}), (0.0, 0.0))
+        desk.device.says = reading._replace(report=report if tells_reports else None)
+        moving = desk.ask()
+    assert moving.dead_man
+    silent = [desk.ask() for _ in range(round((silence_s + 2.0) / PERIOD_S))]
+    held_s = PERIOD_S * sum(sample.dead_man for sample in silent)
+    assert held_s == pytest.approx(silence_s, abs=2 * PERIOD_S)
+    assert "stick is silent while hold is held" in desk.source.trouble
+    np.testing.assert_array_equal(silent[-1].velocity, np.zeros(3))
+    # A new report alone is not enough, nor is a press it tells of.
+    assert not desk.tell(0.02, press="hold").dead_man
+    assert not desk.tell(0.5, press="hold").dead_man
+    desk.hold()
+    assert desk.tell(press="hold").dead_man
+
+
+def test_a_device_at_rest_with_its_dead_man_up_may_be_silent_for_ever() -> None:
+    desk = Desk()
+    desk.ask(6000)
+    assert desk.source.trouble == ""
+    assert desk.tell(press="hold").dead_man
+
+
+def test_what_silence_means_is_known_of_every_device() -> None:
+    usual = {kind.name: kind.usual.silence for kind in KINDS}
+    assert usual["spacemouse"].deflected_s == SILENT_S
+    for silence in usual.values():
+        # At 0.5 m/s, the fastest setting, a device that is lost goes on by less than a meter.
+        assert silence.deflected_s <= 2.0
+        assert silence.resting_s <= 10.0
 
 
 # --- devices whose way is the hand's --------------------------------------------------------------
@@ -221,16 +376,29 @@ def test_letting_go_loses_what_the_hand_had_still_to_go() -> None:
     np.testing.assert_array_equal(again.position, moving.position)
 
 
-@pytest.mark.parametrize("elsewhere", [(5000.0, 0.0), (float("nan"), 0.0), None])
-def test_a_pointer_that_jumps_or_is_nowhere_moves_nothing(
+def test_a_pointer_that_jumps_moves_nothing() -> None:
+    desk = Desk(POINTER)
+    desk.hold()
+    here = desk.tell(press="hold", pointer=(10, 0), times=300).position
+    sample = desk.tell(press="hold", pointer=(5000.0, 0.0), times=50)
+    np.testing.assert_allclose(sample.position, here, atol=1e-9)
+    assert sample.dead_man
+
+
+@pytest.mark.parametrize("elsewhere", [(float("nan"), 0.0), (1e308, 0.0), (0.0, -1e308), None])
+def test_a_pointer_that_is_nowhere_stops_the_hand_until_it_is_pressed_anew(
     elsewhere: tuple[float, float] | None,
 ) -> None:
     desk = Desk(POINTER)
     desk.hold()
     here = desk.tell(press="hold", pointer=(10, 0), times=300).position
-    sample = desk.tell(press="hold", pointer=elsewhere, times=50)
+    assert not desk.tell(press="hold", pointer=elsewhere, times=50).dead_man
+    assert "for the place of its pointer" in desk.source.trouble
+    sample = desk.tell(press="hold", pointer=(10, 0), times=50)
+    assert not sample.dead_man
     np.testing.assert_allclose(sample.position, here, atol=1e-9)
-    assert sample.dead_man
+    desk.hold()
+    assert desk.tell(press="hold").dead_man
 
 
 # --- gone and back --------------------------------------------------------------------------------
@@ -254,6 +422,8 @@ def test_a_device_that_is_gone_stops_at_once_says_so_and_needs_a_released_dead_m
     back = desk.tell(1.0, press="hold", times=20)
     assert not back.dead_man
     np.testing.assert_array_equal(back.position, here)
+    assert "has not been at rest since it came" in desk.source.trouble
+    assert not desk.tell(press="hold", times=20).dead_man
     assert "let go of it and press it anew" in desk.source.trouble
     desk.hold()
     assert desk.source.trouble == ""
@@ -383,6 +553,13 @@ def fake_library(monkeypatch: pytest.MonkeyPatch, name: str, **contents: Any) ->
     return module
 
 
+def on_a_clock(source: Any) -> Any:
+    """Let the time of a source go on by a hundredth of a second with every sample."""
+    ticks = count()
+    source._clock = lambda: PERIOD_S * next(ticks)
+    return source
+
+
 class FakeSpaceMouse:
     """What pyspacemouse opens: one report a reading, many waiting."""
 
@@ -425,8 +602,10 @@ def test_a_spacemouse_is_read_to_its_newest_report_lost_and_taken_up_again(
         AxisConvention=SimpleNamespace(ROS="ros"),
     )
     assert found()[1][:3] == ("spacemouse", "ready", "SpaceNavigator, SpaceMouseCompact")
-    source = open_source(
-        InputDeviceSettings(source="spacemouse", device={"which": "compact"}), TASK, BUILT_IN
+    source = on_a_clock(
+        open_source(
+            InputDeviceSettings(source="spacemouse", device={"which": "compact"}), TASK, BUILT_IN
+        )
     )
     source.sample(0.0)
     opened[0].state.buttons = [1, 0]
@@ -434,6 +613,9 @@ def test_a_spacemouse_is_read_to_its_newest_report_lost_and_taken_up_again(
     opened[0].waiting = [0.1, 0.5, 1.0]
     sample = source.sample(0.02)
     np.testing.assert_allclose(sample.velocity, [DeviceSettings().scale_m_s, 0, 0])
+    silent = [source.sample(0.02) for _ in range(round(2 * SILENT_S / PERIOD_S))]
+    assert PERIOD_S * sum(sample.dead_man for sample in silent) <= SILENT_S
+    assert "spacemouse is silent" in source.trouble
     opened[0].broken = True
     there.clear()
     for elapsed_s in (0.03, 0.04):
@@ -534,7 +716,7 @@ def test_a_gamepads_stick_moves_the_hand_over_the_table_and_it_is_taken_up_again
     pads = [FakePad()]
     fake_sdl(monkeypatch, pads)
     assert found()[0][:3] == ("gamepad", "ready", "Pad 0")
-    source = open_source(InputDeviceSettings(source="gamepad"), TASK, BUILT_IN)
+    source = on_a_clock(open_source(InputDeviceSettings(source="gamepad"), TASK, BUILT_IN))
     full = DeviceSettings().scale_m_s
     source.sample(0.0)
     pads[0].pressed = {10}
@@ -599,7 +781,13 @@ def test_keys_that_are_held_are_axes_and_buttons_until_nobody_listens() -> None:
     assert reading.buttons >= {"ctrl_r", "shift", "w"}
     for key in [*keys, SimpleNamespace(char="w")]:
         listener.on_release(key)
-    assert keyboard.read() == DeviceReading((0.0,) * 6)
+    assert keyboard.read()[:2] == ((0.0,) * 6, frozenset())
+    assert keyboard.read().report == keyboard.read().report
+    before = keyboard.read().report
+    listener.on_press(keys[0])
+    repeated = keyboard.read().report
+    listener.on_press(keys[0])
+    assert len({before, repeated, keyboard.read().report}) == 3
     keyboard.close()
     with pytest.raises(UnpluggedError, match="keyboard is gone"):
         keyboard.read()
@@ -613,7 +801,10 @@ def test_a_mouse_tells_its_pointer_upward_and_the_buttons_that_are_held() -> Non
     assert mouse.read().pointer == (3.0, -4.0)
     listener.on_move(10, 2, False)
     listener.on_click(10, 3, SimpleNamespace(name="left"), True, False)
-    assert mouse.read()[1:] == (frozenset({"left"}), (10.0, -3.0))
+    assert mouse.read()[1:3] == (frozenset({"left"}), (10.0, -3.0))
+    before = mouse.read().report
+    listener.on_move(10, 3, False)
+    assert mouse.read().report != before
     listener.on_click(10, 3, SimpleNamespace(name="left"), False, False)
     assert mouse.read().buttons == frozenset()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Ask, Done, LastSteps, LastStepsQuestion, Motion, RobotState
+from hmcs.bus.messages import Ask, Done, Handle, LastSteps, LastStepsQuestion, Motion, RobotState
 from hmcs.bus.service import run
 from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.wire import encode
 from hmcs.motion.demonstrations import Demonstration, write_csv
 from hmcs.motion.steps import steps_of
+from hmcs_input_device import guarded, held, press_gate
 from hmcs_input_device import service as service_module
 from hmcs_input_device.service import InputDevice
 from hmcs_input_device.sources import LIVE, DeviceSample
@@ -169,15 +172,26 @@ class Robot:
     def __init__(self, bus: Bus) -> None:
         self.may_follow = False
         self.stands = False
+        self.asked_until_s = 0.0
         self._states = bus.publisher(RobotState, bus.keys.robot_state)
         bus.subscribe(Motion, bus.keys.motion, self._on_motion)
 
     def stop(self) -> None:
         self.may_follow = False
 
+    def ask_to_stop(self) -> None:
+        """As `hmcs stop` does; it is told for half a second, or until it moves again."""
+        self.may_follow = False
+        self.asked_until_s = time.monotonic() + 0.5
+
     def _on_motion(self, received: Received[Motion]) -> None:
-        self.may_follow = self.may_follow or not received.body.dead_man
-        self.stands = not (self.may_follow and received.body.dead_man)
+        held = received.body.dead_man
+        self.may_follow = self.may_follow or not held
+        self.stands = not (self.may_follow and held)
+        if not self.stands:
+            self.asked_until_s = 0.0
+        told = self.asked_until_s and (held or time.monotonic() < self.asked_until_s)
+        stop = "asked" if told else "stale_command" if self.stands else "none"
         self._states.put(
             RobotState(
                 robot="fake",
@@ -190,7 +204,7 @@ class Robot:
                 nearest_obstacle="",
                 nearest_distance_m=None,
                 contacts=(),
-                stop="stale_command" if self.stands else "none",
+                stop=stop,
                 limited=(),
             )
         )
@@ -226,13 +240,102 @@ def test_operator_of_a_recording_lets_go_and_presses_again_when_the_robot_stands
             )
 
 
+@pytest.mark.parametrize("source", ["recorded", "synthetic", "simulated"])
+@pytest.mark.parametrize("re_engage", [True, False])
+def test_a_stop_that_was_asked_for_holds_until_a_person_asks_to_play(
+    make_desk: MakeDesk,
+    line_file: Path,
+    caplog: pytest.LogCaptureFixture,
+    source: str,
+    re_engage: bool,
+) -> None:
+    recorded = {"demonstration": line_file, "repeat": 0, "speed": 0.5}
+    desk = make_desk(
+        source=source,
+        re_engage=re_engage,
+        lead_in_s=0.3,
+        rate_hz=100.0,
+        dead_zone_m=0.02,
+        autoplay=False,
+        **(recorded if source == "recorded" else {"repeat": 0} if source == "synthetic" else {}),
+    )
+    robot = Robot(desk.open_bus("robot"))
+    assert "from its beginning" in desk.ask("play", Ask(), Done).detail
+    desk.until(lambda: len(desk.steps) >= 2, "steps")
+    for _ in range(2):
+        stop_and_go_on(desk, robot)
+    assert caplog.text.count("lets go, as a stop was asked for") == 2
+    assert [received.body.index for received in desk.steps] == list(range(len(desk.steps)))
+    assert max(np.linalg.norm(received.body.displacement) for received in desk.steps) < 0.1
+
+
+def stop_and_go_on(desk: Any, robot: Robot) -> None:
+    """Ask for a stop, look for long that it holds, and ask to play."""
+    before_s = float(desk.service.facts()["played_s"])
+    robot.ask_to_stop()
+    desk.until(lambda: desk.service.facts()["stopped"] == "x", "the stop to be heard")
+    healthy, detail = desk.service.health()
+    assert healthy
+    assert detail.startswith("stopped: x was asked to stand; goes on when it is asked to play")
+    desk.until(lambda: not desk.motions[-1].body.dead_man, "the hand to let go")
+    count, steps = len(desk.motions), len(desk.steps)
+    # Longer than a played operator takes to react, and than a pass with its lead-in.
+    until_s = time.monotonic() + 2.0
+    desk.until(lambda: time.monotonic() > until_s, "time to pass")
+    assert len(desk.motions) > count
+    assert not any(received.body.dead_man for received in desk.motions[count:])
+    assert not any(received.body.velocity.any() for received in desk.motions[count:])
+    assert len(desk.steps) == steps
+    assert "takes hold again and goes on at" in desk.ask("play", Ask(), Done).detail
+    desk.until(lambda: not robot.stands, "the robot to follow again")
+    assert desk.service.facts()["stopped"] == ""
+    desk.until(lambda: len(desk.steps) > steps + 1, "steps where it goes on")
+    assert float(desk.service.facts()["played_s"]) >= before_s
+
+
+def test_a_stop_before_it_plays_is_not_undone_by_its_own_beginning(play: MakeDesk) -> None:
+    desk = play(wait_for=("robot",), re_engage=True)
+    robot_bus = desk.open_bus("robot")
+    robot = Robot(robot_bus)
+    robot.ask_to_stop()
+    desk.until(lambda: desk.service.facts()["stopped"] == "x", "the stop to be heard")
+    desk.listener.announce(desk.listener.keys.presence("robot", "x"))
+    count = len(desk.motions)
+    desk.until(lambda: len(desk.motions) > count + 100, "time to begin")
+    assert not any(received.body.dead_man for received in desk.motions)
+    assert "from its beginning" in desk.ask("play", Ask(), Done).detail
+    desk.until(lambda: not robot.stands, "the robot to follow")
+
+
+def test_what_is_no_robot_of_the_cell_stops_nothing(play: MakeDesk) -> None:
+    desk = play(repeat=0)
+    desk.listener.announce(desk.listener.keys.presence("robot", "true"))
+    stranger = Robot(desk.open_bus("robot"))
+    desk.until(lambda: "robot" in str(desk.service._present), "the robot's token")
+    stranger.ask_to_stop()
+    count = len(desk.motions)
+    desk.until(lambda: len(desk.motions) > count + 50, "time to pass")
+    assert desk.service.facts()["stopped"] == ""
+
+
+def test_after_its_end_a_stop_is_ended_by_playing_anew(play: MakeDesk) -> None:
+    desk = play()
+    robot = Robot(desk.open_bus("robot"))
+    desk.until_finished()
+    robot.ask_to_stop()
+    desk.until(lambda: desk.service.facts()["stopped"] == "x", "the stop to be heard")
+    steps = len(desk.steps)
+    assert "from its beginning" in desk.ask("play", Ask(), Done).detail
+    desk.until(lambda: len(desk.steps) > steps, "steps")
+
+
 class Hand:
     """A device that says what it is told to."""
 
     rate_hz, duration_s, reach_m = 200.0, LIVE, None
 
     def __init__(self) -> None:
-        self.says: DeviceSample | None = DeviceSample(np.zeros(3), np.zeros(3), dead_man=True)
+        self.says: DeviceSample | None = DeviceSample(np.zeros(3), np.zeros(3), dead_man=False)
         self.closed = False
 
     def move(self, x_m: float, **fields: Any) -> None:
@@ -246,10 +349,27 @@ class Hand:
         self.closed = True
 
 
+def seen(desk: Any) -> None:
+    """Pump until what the device says now was published."""
+    count = len(desk.motions)
+    desk.until(lambda: len(desk.motions) > count + 3, "the device to be seen")
+
+
+def press(desk: Any, hand: Hand, **fields: Any) -> None:
+    """Let go and press."""
+    for dead_man in (False, True):
+        hand.move(0.0, dead_man=dead_man, **fields)
+        seen(desk)
+    assert desk.motions[-1].body.dead_man
+
+
 @pytest.fixture
 def hand(monkeypatch: pytest.MonkeyPatch) -> Hand:
     device = Hand()
     monkeypatch.setattr(service_module, "BUILT_IN", {"hand": lambda *_: device})
+    # A busy machine may hold this test up; what becomes of a hang is tested without a clock.
+    monkeypatch.setattr(press_gate, "HANG_S", 60.0)
+    monkeypatch.setattr(guarded, "FROZEN_S", 60.0)
     return device
 
 
@@ -260,10 +380,9 @@ def test_motion_made_while_clutched_or_released_is_taken_out_of_the_steps(
 
     def let(x_m: float, **fields: Any) -> None:
         hand.move(x_m, **fields)
-        count = len(desk.motions)
-        desk.until(lambda: len(desk.motions) > count + 3, "the device to be seen")
+        seen(desk)
 
-    let(0.0)
+    press(desk, hand)
     let(0.03)
     let(0.03, clutch=True)
     let(0.50, clutch=True)
@@ -287,10 +406,9 @@ def test_steps_tell_what_was_felt_and_signaled_and_are_told_again_alike(
 
     def let(x_m: float, turn: int, **fields: Any) -> None:
         hand.move(x_m, orientation=turns[turn], wrench=np.full(6, float(turn)), **fields)
-        count = len(desk.motions)
-        desk.until(lambda: len(desk.motions) > count + 3, "the device to be seen")
+        seen(desk)
 
-    let(0.0, 0)
+    press(desk, hand, orientation=turns[0], wrench=np.zeros(6))
     let(0.03, 1)
     let(0.03, 1, pedal=True, dead_man=False)
     let(0.03, 1, dead_man=False)
@@ -312,21 +430,31 @@ def test_steps_tell_what_was_felt_and_signaled_and_are_told_again_alike(
 
 def test_an_orientation_that_is_no_rotation_is_refused(make_desk: MakeDesk, hand: Hand) -> None:
     desk = make_desk(source="hand", dead_zone_m=0.02)
-    hand.move(0.05, orientation=np.zeros(4))
+    press(desk, hand)
+    hand.move(0.0, orientation=np.zeros(4))
     desk.until(lambda: desk.bus.counters.refused["motion"] > 2, "refusals")
     assert not desk.service.health()[0]
-    hand.move(0.05, orientation=np.array([0, 0, 1.0, 0]))
+    turned = np.array([0, 0, 1.0, 0])
+    press(desk, hand, orientation=turned)
+    hand.move(0.05, orientation=turned)
     desk.until(lambda: desk.steps, "a step")
     assert desk.service.health()[0]
 
 
-def test_a_sample_that_is_none_is_refused_counted_and_nothing_is_lost(
+def test_a_sample_that_is_none_is_refused_counted_and_only_a_new_press_moves_again(
     make_desk: MakeDesk, hand: Hand
 ) -> None:
     desk = make_desk(source="hand", dead_zone_m=0.02)
+    press(desk, hand)
     hand.move(float("nan"))
     desk.until(lambda: desk.bus.counters.refused["motion"] > 2, "refusals")
     assert not desk.service.health()[0]
+    hand.move(0.05)
+    count = len(desk.motions)
+    desk.until(lambda: len(desk.motions) > count + 20, "samples at rest")
+    assert not desk.motions[-1].body.dead_man
+    assert "let go of it and press it anew" in desk.service.health()[1]
+    press(desk, hand)
     hand.move(0.05)
     desk.until(lambda: desk.steps, "a step")
     assert desk.steps[0].body.displacement[0] == pytest.approx(0.05)
@@ -335,13 +463,80 @@ def test_a_sample_that_is_none_is_refused_counted_and_nothing_is_lost(
     assert desk.listener.counters.lost["motion"] == 0
 
 
-def test_a_device_that_falls_silent_is_unhealthy_and_closed_at_the_end(
-    make_desk: MakeDesk, hand: Hand
+def test_a_device_that_falls_silent_rests_is_unhealthy_and_closed_at_the_end(
+    make_desk: MakeDesk, hand: Hand, caplog: pytest.LogCaptureFixture
 ) -> None:
     desk = make_desk(source="hand")
+    press(desk, hand)
     hand.says = None
     desk.until(lambda: not desk.service.health()[0], "bad health")
-    assert "gives no samples" in desk.service.health()[1]
+    assert "hand: gives no samples" in desk.service.health()[1]
+    count = len(desk.motions)
+    desk.until(lambda: len(desk.motions) > count + 3, "samples at rest")
+    assert not desk.motions[-1].body.dead_man
+    assert caplog.text.count("the hand rests") == 1
     assert isinstance(desk.ask("play", Ask(), Done), RequestRefusedError)
     desk.service.close()
     assert hand.closed
+
+
+def test_a_hand_that_is_there_ends_a_stop_by_itself(make_desk: MakeDesk, hand: Hand) -> None:
+    """A person lets go and takes hold again; nobody else has to be asked."""
+    desk = make_desk(source="hand")
+    robot = Robot(desk.open_bus("robot"))
+    press(desk, hand)
+    robot.ask_to_stop()
+    seen(desk)
+    assert robot.stands
+    assert desk.motions[-1].body.dead_man
+    assert desk.service.facts()["stopped"] == ""
+    press(desk, hand)
+    desk.until(lambda: not robot.stands, "the robot to follow")
+
+
+# --- the page's handle ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def page(make_desk: MakeDesk, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A device that is the handle of a page, and a page."""
+    monkeypatch.setattr(press_gate, "HANG_S", 60.0)
+    monkeypatch.setattr(held, "SILENT_S", 60.0)
+    desk = make_desk(source="page", dead_zone_m=0.02)
+    desk.handles = desk.open_bus("console").publisher(Handle, desk.bus.keys.handle)
+    return desk
+
+
+def tell(page: Any, x_m: float, operator: str = "page-1", *, dead_man: bool = True) -> None:
+    page.handles.put(
+        Handle(operator=operator, position=np.array([x_m, 0.0, 0.0]), dead_man=dead_man)
+    )
+    received = page.bus.counters.received["handle"]
+    page.until(lambda: page.bus.counters.received["handle"] > received, "the handle to be heard")
+    seen(page)
+
+
+def test_a_page_that_is_hostile_leaves_no_trace(page: Any) -> None:
+    tell(page, 0.0, dead_man=False)
+    tell(page, 0.0)
+    assert page.motions[-1].body.dead_man
+    for x_m in (1e9, -1e9, 2e4, -2e4):
+        tell(page, x_m)
+    assert not page.motions[-1].body.dead_man
+    assert page.bus.counters.refused["handle"] == 4
+    assert "out of reach" in page.service.health()[1]
+    for seq in (2**53, 0, 2**52, 1):
+        body = Handle(operator="page-1", position=np.full(3, 5.0), dead_man=True)
+        stamped = page.handles._stamp(None).model_copy(update={"seq": seq})
+        page.handles._publisher.put(encode(body, stamped), attachment=page.handles._sender)
+    for operator in ("\x1b[2J", "<script>", "x" * 64, "\u202e", "page-2"):
+        tell(page, 0.3, operator)
+    assert not page.motions[-1].body.dead_man
+    assert np.abs(page.motions[-1].body.position).max() == 0.0
+    tell(page, 0.0, dead_man=False)
+    tell(page, 0.0)
+    page.until(lambda: page.motions[-1].body.dead_man, "a new press")
+    assert page.service.health() == (True, "playing")
+    tell(page, 0.1)
+    page.until(lambda: len(page.steps) >= 2, "steps")
+    assert np.abs(page.motions[-1].body.position).max() <= 0.1

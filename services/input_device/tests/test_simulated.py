@@ -13,7 +13,7 @@ from hmcs.task import find_task, load_task
 from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.simulated import Simulated
-from hmcs_input_device.sources import LIVE, open_source
+from hmcs_input_device.sources import LIVE, DeviceSample, open_source
 
 LINES = load_task("lines-through-obstacles")
 LINES_CSV = find_task("lines-through-obstacles").with_suffix(".csv")
@@ -42,6 +42,15 @@ def led(source: Simulated, seconds: float, begin_s: float = 0.0) -> np.ndarray:
     return np.array(trail)
 
 
+def samples_at(source: Simulated, robot: np.ndarray, ticks: int) -> list[DeviceSample]:
+    """What the source does while the robot stands where it is."""
+    samples = []
+    for tick in range(ticks):
+        source.sees(robot, TURNED)
+        samples.append(source.sample(tick / 100))
+    return samples
+
+
 def test_it_leads_a_robot_that_follows_to_the_end_and_rests_there() -> None:
     source = opened()
     trail = led(source, 20.0)
@@ -52,8 +61,7 @@ def test_it_leads_a_robot_that_follows_to_the_end_and_rests_there() -> None:
 
 def test_a_robot_that_does_not_follow_is_steered_all_the_same() -> None:
     source = opened()
-    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
-    samples = [source.sample(tick / 100) for tick in range(200)]
+    samples = samples_at(source, np.array(LINES.robot.tool_start_m), 200)
     assert samples[-1].dead_man
     assert np.linalg.norm(samples[-1].velocity) > 0.02
     assert source.duration_s == LIVE
@@ -61,8 +69,7 @@ def test_a_robot_that_does_not_follow_is_steered_all_the_same() -> None:
 
 def test_the_hand_goes_as_far_as_its_velocity_says() -> None:
     source = opened()
-    source.sees(np.array(LINES.robot.tool_start_m), TURNED)
-    samples = [source.sample(tick / 100) for tick in range(300)]
+    samples = samples_at(source, np.array(LINES.robot.tool_start_m), 300)
     moved = samples[-1].position - samples[0].position
     np.testing.assert_allclose(moved, sum(s.velocity for s in samples) / 100, atol=1e-9)
 
@@ -74,10 +81,35 @@ def test_it_waits_until_the_robot_is_seen() -> None:
     assert source.sample(2.0).dead_man
 
 
+@pytest.mark.parametrize("task", [LINES.name, "object-3d"])
+def test_while_nobody_sees_the_robot_the_hand_rests(task: str) -> None:
+    """Also a hand that leads the tool: what its sensor felt last is no force for ever."""
+    start = np.array(load_task(task).robot.tool_start_m)
+    source = open_source(
+        InputDeviceSettings(
+            task=task,
+            source="simulated",
+            lead_in_s=0.5,
+            demonstration=find_task(task).with_suffix(".csv"),
+        ),
+        load_task(task),
+        BUILT_IN,
+    )
+    assert samples_at(source, start, 300)[-1].dead_man
+    unseen = [source.sample(3.0 + tick / 100) for tick in range(200)]
+    assert 0.4 < sum(sample.dead_man for sample in unseen) / 100 < 0.6
+    np.testing.assert_array_equal(unseen[-1].velocity, np.zeros(3))
+    np.testing.assert_array_equal(unseen[-1].position, unseen[60].position)
+    source.sees(start, TURNED)
+    again = source.sample(5.0)
+    assert again.dead_man
+    assert np.linalg.norm(again.position - unseen[-1].position) < 0.01
+
+
 def test_a_process_that_hung_does_not_jump() -> None:
     source = opened()
+    before = samples_at(source, np.array(LINES.robot.tool_start_m), 100)[-1]
     source.sees(np.array(LINES.robot.tool_start_m), TURNED)
-    before = [source.sample(tick / 100) for tick in range(100)][-1]
     after = source.sample(5.0)
     assert np.linalg.norm(after.position - before.position) < 0.03
 

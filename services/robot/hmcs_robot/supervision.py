@@ -44,6 +44,9 @@ _LASTING: tuple[Stop, ...] = (
 """Stops that stay the reason when the commands go stale."""
 AT_ONCE: tuple[Stop, ...] = ("collision", "late_tick")
 """Stops as hard as the arm can brake; all others are within its acceleration limits."""
+ASKED_TOLD_NS = 500_000_000
+"""So long at least a stop that was asked for stays the reason, also where nobody drives: who plays
+a recording must not miss it."""
 Verdict = Literal["accepted", "second_writer", "late"]
 Writer = str | bytes
 """Something that is the same for all commands of one boot of one process, and for no others."""
@@ -97,6 +100,8 @@ class Supervision:
     """When the wire room last gave a sign of life."""
     contacts: tuple[str, ...] = ()
     """What the arm touched at the last tick."""
+    asked_until_ns: int = 0
+    """Until when a stop that was asked for stays the reason."""
 
 
 def heard(now: Supervision, time_ns: int, policy: Policy) -> Supervision:
@@ -122,7 +127,9 @@ def accept(
             now = _halt(now, "second_writer")
     now = replace(now, writer=order.writer, fresh_until_ns=fresh_until_ns)
     if not order.engaged:
-        return replace(now, stop="disengaged", armed=True, twist=np.zeros(6)), "accepted"
+        asked = now.stop == "asked" and time_ns < now.asked_until_ns
+        stop: Stop = "asked" if asked else "disengaged"
+        return replace(now, stop=stop, armed=True, twist=np.zeros(6)), "accepted"
     if now.stop == "none" or now.armed:
         return replace(now, stop="none", armed=False, twist=order.twist), "accepted"
     return now, "accepted"
@@ -154,7 +161,7 @@ def tick(
 
 def stopped(now: Supervision) -> Supervision:
     """Return the supervision after somebody asked for a stop."""
-    return _halt(now, "asked")
+    return replace(_halt(now, "asked"), asked_until_ns=(now.ticked_ns or 0) + ASKED_TOLD_NS)
 
 
 def unpaired(now: Supervision, writer: Writer) -> Supervision:

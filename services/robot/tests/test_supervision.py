@@ -160,6 +160,23 @@ def test_whoever_asks_stops_it_until_the_operator_lets_go_and_takes_hold_again()
     assert story.tick(201) == "none"
 
 
+def test_a_stop_that_was_asked_for_is_told_of_for_a_while_also_where_nobody_drives() -> None:
+    story = Story()
+    story.engage()
+    story.order(1, False)
+    assert story.tick(2) == "disengaged"
+    story.now = stopped(story.now)
+    for at_ms in range(10, 500, 10):
+        story.order(at_ms, False)
+        assert story.tick(at_ms) == "asked"
+    story.order(510, False)
+    assert story.tick(511) == "disengaged"
+    story.now = stopped(story.now)
+    story.order(520, False)
+    story.order(530, True)
+    assert story.tick(531) == "none"
+
+
 def test_a_hang_of_the_wire_room_stops_and_refuses_what_queued_up() -> None:
     story = Story()
     story.engage()

@@ -21,8 +21,8 @@ from pydantic import ValidationError
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.bus.keys import ANY, KeyNameError, Member
 from hmcs.bus.messages import Ask, Health
-from hmcs.bus.presence import present
-from hmcs.bus.session import Bus, BusSettings, BusUnavailableError, RequestRefusedError
+from hmcs.bus.presence import possible, present
+from hmcs.bus.session import Answer, Bus, BusSettings, BusUnavailableError, RequestRefusedError
 from hmcs.shown import plain
 
 ROUTER = "router"
@@ -62,7 +62,11 @@ def _problem(arguments: argparse.Namespace) -> str | None:
     except RequestRefusedError as error:
         return f"could not say how it is: {error}"
     within = f"within {arguments.timeout:g} s (router {settings.router})"
-    told = {Member(a.envelope.source.service, a.envelope.source.instance): a.body for a in answers}
+    told = {
+        member: answer.body
+        for answer in answers
+        if possible(member := _sender(answer)) and member.service == arguments.service
+    }
     problems = [
         *(
             f"{member.instance}: is present, but did not answer {within}"
@@ -70,7 +74,7 @@ def _problem(arguments: argparse.Namespace) -> str | None:
             if member not in told
         ),
         *(
-            f"{plain(member.instance)}: {plain(health.detail)}"
+            f"{member.instance}: {plain(health.detail)}"
             for member, health in sorted(told.items(), key=itemgetter(0))
             if not health.healthy
         ),
@@ -78,6 +82,10 @@ def _problem(arguments: argparse.Namespace) -> str | None:
     if not told and not problems:
         return f"nobody answered on {key} {within}"
     return "; ".join(problems) or None
+
+
+def _sender(answer: Answer[Health]) -> Member:
+    return Member(answer.envelope.source.service, answer.envelope.source.instance)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -2,6 +2,10 @@
 
 Axes: the left stick to the right (x) and up (y), the right trigger less the left one (z), the right
 stick to the right (rx) and up (ry). Buttons as SDL names those of every known gamepad.
+
+SDL tells when a gamepad is detached, and of a wireless one that is out of reach only once its
+receiver has given it up, after seconds. Until then its last values stand. As a gamepad reports what
+changes and no more, a stick that is held still looks alike: it may be still for a second.
 """
 
 from __future__ import annotations
@@ -10,7 +14,7 @@ import os
 from typing import Any
 
 from hmcs_input_device.devices.libraries import NoDeviceError, library
-from hmcs_input_device.devices.mapping import AxisMap, Buttons, Usual
+from hmcs_input_device.devices.mapping import AxisMap, Buttons, Silence, Usual
 from hmcs_input_device.devices.reading import DeviceReading, UnpluggedError
 from hmcs_input_device.settings import DeviceSettings
 
@@ -25,6 +29,7 @@ USUAL = Usual(
     AxisMap(x="y", y="-x", z="ry"),
     Buttons(dead_man="right_shoulder", clutch="left_shoulder", pedal="a"),
     has=("x", "y", "z", "rx", "ry"),
+    silence=Silence(deflected_s=1.0),
 )
 """The left stick moves the hand over the table, the right one up and down."""
 

@@ -1,7 +1,7 @@
 """From what a device says to the motion of a hand: pure, one reading after another.
 
-A reading moves the hand only together with the one before it: both usable, both with the dead-man
-held and no clutch, and near each other. Whatever else happens, the hand rests.
+A reading moves the hand only together with the one before it: both usable, both with a dead-man
+that counts and no clutch, and near each other. Whatever else happens, the hand rests.
 """
 
 from __future__ import annotations
@@ -16,12 +16,19 @@ from numpy.typing import NDArray
 from hmcs.errors import UserError
 from hmcs_input_device.devices.reading import AXES, DeviceReading
 from hmcs_input_device.settings import AxisName, DeviceSettings
+from hmcs_input_device.sources import FARTHEST_M
 
 FloatArray = NDArray[np.float64]
 
 FOLLOW_S = 0.08
 """Time constant with which the hand follows a pointer, which tells its place in jerks; also the
 longest time that one reading moves the hand for: nobody knows what a device did meanwhile."""
+FARTHEST_PIXELS = 1e6
+"""No screen is larger."""
+LEAST_REST = 0.05
+"""Share of the full deflection within which an axis is at rest even without a dead band."""
+FLIP = 1.5
+"""No hand moves an axis by so much of its full deflection from one reading to the next."""
 
 Kind = Literal["rate", "position"]
 """A deflection is a velocity; a way of the pointer is a way of the hand."""
@@ -51,6 +58,18 @@ class Buttons(NamedTuple):
     pedal: str
 
 
+class Silence(NamedTuple):
+    """For how long a device may say nothing while its dead-man is held, before it is not believed.
+
+    Of no device it is known whether it lives while it is silent; each is silent otherwise.
+    """
+
+    deflected_s: float = 1.0
+    """While it moves the hand."""
+    resting_s: float = 10.0
+    """While its axes are at rest: some plans move the robot all the same."""
+
+
 class Usual(NamedTuple):
     """How a kind of device is used where the settings do not say it."""
 
@@ -59,6 +78,9 @@ class Usual(NamedTuple):
     buttons: Buttons
     has: tuple[str, ...] = AXES
     """Axes that it has, of AXES."""
+    silence: Silence = Silence()
+    switches: bool = False
+    """Whether its axes are switches, which go from one end to the other at once."""
 
 
 class Rules(NamedTuple):
@@ -73,6 +95,8 @@ class Rules(NamedTuple):
     jump: float
     m_per_pixel: float
     jump_pixels: float
+    silence: Silence
+    switches: bool
 
 
 class Hand(NamedTuple):
@@ -85,14 +109,10 @@ class Hand(NamedTuple):
     dead_man: bool = False
     clutch: bool = False
     pedal: bool = False
-    released: bool = False
-    """The dead-man was seen released since the device came; before, pressing it means nothing."""
     last: DeviceReading | None = None
     """The reading before; None where it could not be used."""
     due: FloatArray = np.zeros(3)
     """m, shape (3,): what a pointer has moved and the hand has not yet."""
-    problem: str = ""
-    """Why the last reading could not be used."""
 
 
 def rules_of(settings: DeviceSettings, usual: Usual) -> Rules:
@@ -126,6 +146,11 @@ def rules_of(settings: DeviceSettings, usual: Usual) -> Rules:
         settings.jump,
         settings.m_per_pixel,
         settings.jump_pixels,
+        Silence(
+            settings.deflected_silence_s or usual.silence.deflected_s,
+            settings.resting_silence_s or usual.silence.resting_s,
+        ),
+        usual.switches,
     )
 
 
@@ -146,43 +171,76 @@ def banded(deflection: FloatArray, dead_band: float) -> FloatArray:
     return np.asarray(np.sign(deflection) * beyond)
 
 
-def moved(hand: Hand, reading: DeviceReading, elapsed_s: float, rules: Rules) -> Hand:
-    """Return the hand after a reading that came `elapsed_s` after the one before it."""
-    held = rules.buttons.dead_man in reading.buttons
-    problem = _problem(reading, rules)
+def moved(
+    hand: Hand, reading: DeviceReading, elapsed_s: float, rules: Rules, *, dead_man: bool
+) -> Hand:
+    """Return the hand after a usable reading that came `elapsed_s` after the one before it.
+
+    `dead_man` is whether its dead-man is held and counts.
+    """
     now = Hand(
         hand.position,
-        dead_man=held and hand.released,
+        dead_man=dead_man,
         clutch=rules.buttons.clutch in reading.buttons,
         pedal=rules.buttons.pedal in reading.buttons,
-        released=hand.released or not held,
-        last=None if problem else reading,
-        problem=problem,
+        last=reading,
     )
     last = hand.last
-    if problem or last is None or not (_moves(hand) and _moves(now)):
+    if last is None or not (_moves(hand) and _moves(now)):
         return now
     elapsed_s = min(max(elapsed_s, 0.0), FOLLOW_S)
     if rules.kind == "rate":
-        velocity = _velocity(last, reading, rules)
-        return now._replace(velocity=velocity, position=hand.position + velocity * elapsed_s)
-    due = _due(hand.due, last, reading, rules)
-    velocity = due / FOLLOW_S
+        velocity, due = _velocity(last, reading, rules), np.zeros(3)
+    else:
+        due = _due(hand.due, last, reading, rules)
+        velocity = due / FOLLOW_S
     way = velocity * elapsed_s
-    return now._replace(velocity=velocity, position=hand.position + way, due=due - way)
+    if not np.abs(hand.position + way).max() <= FARTHEST_M:
+        return now
+    due = due - way if rules.kind == "position" else due
+    return now._replace(velocity=velocity, position=hand.position + way, due=due)
 
 
-def unplugged(hand: Hand) -> Hand:
-    """Return the hand of a device that is gone: at rest, let go of, and to be let go of again."""
+def resting(hand: Hand) -> Hand:
+    """Return the hand of a device that cannot be believed: at rest, and let go of."""
     return Hand(hand.position)
+
+
+def deflected(reading: DeviceReading, rules: Rules) -> str:
+    """Return the name and value of an axis that moves the hand and is not at rest; else empty."""
+    if rules.kind == "position":
+        return ""
+    for name, value, column in zip(AXES, reading.axes, rules.axes.T, strict=True):
+        if column.any() and abs(value) > max(rules.dead_band, LEAST_REST):
+            return f"axis {name} ({value:.2f})"
+    return ""
+
+
+def problem_with(last: DeviceReading | None, reading: DeviceReading, rules: Rules) -> str:
+    """Return why a reading after `last` cannot be used; empty where it can."""
+    if len(reading.axes) != len(AXES):
+        return f"tells {len(reading.axes)} axes, expected {len(AXES)}"
+    for name, value in zip(AXES, reading.axes, strict=True):
+        if not math.isfinite(value):
+            return f"tells {value} for its axis {name}"
+    if rules.kind == "position":
+        return _pointer_problem(reading)
+    if last is None or rules.switches:
+        return ""
+    change = rules.axes @ np.subtract(_clipped(reading), _clipped(last))
+    return f"jumped by {np.abs(change).max():.2f}" if np.abs(change).max() > FLIP else ""
 
 
 def _moves(hand: Hand) -> bool:
     return hand.dead_man and not hand.clutch
 
 
+def _clipped(reading: DeviceReading) -> FloatArray:
+    return np.clip(reading.axes, -1.0, 1.0)
+
+
 def _velocity(last: DeviceReading, reading: DeviceReading, rules: Rules) -> FloatArray:
-    before, now = (rules.axes @ np.clip(each.axes, -1.0, 1.0) for each in (last, reading))
+    before, now = (rules.axes @ _clipped(each) for each in (last, reading))
     if np.abs(now - before).max() > rules.jump:
         return np.zeros(3)
     return rules.scale_m_s * _limited(banded(now, rules.dead_band), 1.0)
@@ -204,14 +262,8 @@ def _limited(vector: FloatArray, most: float) -> FloatArray:
     return vector * (most / length) if length > most else vector
 
 
-def _problem(reading: DeviceReading, rules: Rules) -> str:
-    if len(reading.axes) != len(AXES):
-        return f"tells {len(reading.axes)} axes, expected {len(AXES)}"
-    for name, value in zip(AXES, reading.axes, strict=True):
-        if not math.isfinite(value):
-            return f"tells {value} for its axis {name}"
-    if rules.kind == "position" and (
-        reading.pointer is None or not all(map(math.isfinite, reading.pointer))
-    ):
-        return f"tells {reading.pointer} for the place of its pointer"
+def _pointer_problem(reading: DeviceReading) -> str:
+    pointer = reading.pointer
+    if pointer is None or not all(abs(place) <= FARTHEST_PIXELS for place in pointer):
+        return f"tells {pointer} for the place of its pointer"
     return ""

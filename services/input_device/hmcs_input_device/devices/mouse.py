@@ -3,6 +3,9 @@
 Its pointer moves right (x) and up (y) in a plane, by default the upright one before the operator.
 Windows see the buttons too: keep the pointer over an empty part of the desktop. At the edge of the
 screen the pointer stands, and so does the hand: bring it back with the clutch.
+
+A mouse that is silent lets the hand rest, as one that lies still does: with its dead-man held it
+counts as lost after a while only.
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ class Mouse:
         """Listen by pynput's module `mouse`."""
         self._lock = threading.Lock()
         self._pressed: set[str] = set()
+        self._reports = 0
         x, y = mouse.Controller().position
         self._pointer = float(x), -float(y)
         self._listener = mouse.Listener(on_move=self._on_move, on_click=self._on_click)
@@ -43,7 +47,9 @@ class Mouse:
         """Return where the pointer is; raises UnpluggedError once nobody listens."""
         check_listens(self._listener, NAME)
         with self._lock:
-            return DeviceReading((0.0,) * len(AXES), frozenset(self._pressed), self._pointer)
+            return DeviceReading(
+                (0.0,) * len(AXES), frozenset(self._pressed), self._pointer, self._reports
+            )
 
     def close(self) -> None:
         """Listen no longer."""
@@ -51,10 +57,12 @@ class Mouse:
 
     def _on_move(self, x: float, y: float, *_: Any) -> None:
         with self._lock:
+            self._reports += 1
             self._pointer = float(x), -float(y)
 
     def _on_click(self, x: float, y: float, button: Any, pressed: bool, *_: Any) -> None:
         with self._lock:
+            self._reports += 1
             self._pointer = float(x), -float(y)
             (self._pressed.add if pressed else self._pressed.discard)(button.name)
 

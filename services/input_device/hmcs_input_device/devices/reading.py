@@ -21,6 +21,9 @@ class DeviceReading(NamedTuple):
     """Names of those that are pressed."""
     pointer: tuple[float, float] | None = None
     """px, to the right and up, from anywhere; None where it has none."""
+    report: float | None = None
+    """Another one with every report of the device; None where its library does not tell: then only
+    what changes shows that it lives."""
 
 
 class Device(Protocol):

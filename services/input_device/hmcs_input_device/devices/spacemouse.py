@@ -2,6 +2,9 @@
 
 Axes: x forward, y left, z up, and the turns about them, as in the operator frame. Buttons as
 pyspacemouse names them, in lower case.
+
+While its cap is deflected it sends some 400 reports a second, and pyspacemouse tells the time of
+the newest: without a new one it is out of reach. At rest it sends nothing.
 """
 
 from __future__ import annotations
@@ -9,8 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 from hmcs_input_device.devices.libraries import NoDeviceError, NotInstalledError, library
-from hmcs_input_device.devices.mapping import AxisMap, Buttons, Usual
+from hmcs_input_device.devices.mapping import AxisMap, Buttons, Silence, Usual
 from hmcs_input_device.devices.reading import DeviceReading, UnpluggedError
+from hmcs_input_device.press_gate import SILENT_S
 from hmcs_input_device.settings import DeviceSettings
 
 NAME = "spacemouse"
@@ -18,6 +22,7 @@ USUAL = Usual(
     "rate",
     AxisMap(x="x", y="y", z="z"),
     Buttons(dead_man="left", clutch="right", pedal="menu"),
+    silence=Silence(deflected_s=SILENT_S),
 )
 """One with two buttons only has no pedal; one without a left button needs another dead-man."""
 
@@ -57,6 +62,7 @@ class SpaceMouse:
         return DeviceReading(
             (state.x, state.y, state.z, state.roll, state.pitch, state.yaw),
             frozenset(name for name, down in pressed if down),
+            report=state.t,
         )
 
     def close(self) -> None:

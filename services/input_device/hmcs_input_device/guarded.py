@@ -1,0 +1,153 @@
+"""What every source goes through, built in or of another distribution: none is believed blindly."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from hmcs.bus.messages import Motion
+from hmcs_input_device.press_gate import SILENT_S, PressGate
+from hmcs_input_device.sources import (
+    FARTHEST_M,
+    FASTEST_M_S,
+    DeviceSample,
+    Source,
+    Troubled,
+    at_rest,
+    plays,
+    released,
+)
+
+FROZEN_S = 0.5
+"""A hand with a velocity or a force that stays the very same for so long is none that moves."""
+FASTEST_RAD_S = 50.0
+"""No hand turns faster."""
+JUMP_M = 0.05
+"""So much farther than the fastest hand goes, a position may be off."""
+LARGEST_WRENCH = 1e4
+"""No hand pushes harder, N and N·m."""
+
+
+STILL_M_S, STILL_N = 1e-3, 0.5
+"""A hand with less may well stay as it is."""
+
+
+class Guarded:
+    """A source whose samples are checked, and whose dead-man counts by the rule of `PressGate`.
+
+    Where the source says nothing, fails, or says what no hand does, the hand rests where it was
+    last. A source that plays has nobody who presses: of it only what is no sample is refused.
+    """
+
+    def __init__(self, source: Source, name: str) -> None:
+        self._source = source
+        self._name = name
+        self._plays = plays(source)
+        self._gate = PressGate("the dead-man's switch", minds_hangs=not self._plays)
+        self._hand: DeviceSample | None = None
+        self._told: DeviceSample | None = None
+        self._told_s = self._same_since_s = -float("inf")
+        self._fault = ""
+        self.refusal = ""
+        """Why what the source said last is no sample of a hand; empty where it is, or is none."""
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing moves, and what to do; empty while all is well."""
+        return self._reported() or self._fault or self._gate.trouble
+
+    def sample(self, now_s: float, elapsed_s: float | None) -> DeviceSample | None:
+        """Return the hand at `now_s`; None before the source has said anything of use.
+
+        `elapsed_s` as in `Source.sample`.
+        """
+        # Whatever a device of another distribution raises, the hand rests and the service goes on.
+        self._fault = self.refusal = ""
+        try:
+            told = self._checked(now_s, self._source.sample(elapsed_s))
+        except _SilentError as error:
+            self._fault = f"{self._name}: {error}"
+        except _NoSampleError as error:
+            self._fault = self.refusal = f"{self._name}: {error}"
+        except Exception as error:
+            failed = f"{self._name}: it failed with {type(error).__name__} ({error})"
+            self._fault = self.refusal = f"{failed}: look after the device"
+        if self._fault:
+            self._gate.passes(now_s, pressed=False, trouble=self._fault)
+            self._hand = None if self._hand is None else at_rest(self._hand)
+            return self._hand
+        if elapsed_s is None:
+            self._gate.shut("it was held before it was to play")
+        elif self._gate.passes(now_s, told.dead_man, self._reported()):
+            self._hand = told
+            return told
+        self._hand = released(told)
+        return self._hand
+
+    def _reported(self) -> str:
+        return self._source.trouble if isinstance(self._source, Troubled) else ""
+
+    def _checked(self, now_s: float, told: DeviceSample | None) -> DeviceSample:
+        """Return what the source says; raises _NoSampleError or _SilentError otherwise."""
+        if told is None:
+            raise _SilentError("gives no samples: look after the device")
+        try:
+            motion = Motion(**told._asdict())
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise _NoSampleError(f"gives samples that are none: {where}: {first['msg']}") from None
+        if not np.abs(motion.position).max() <= FARTHEST_M:
+            raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: begin anew nearer")
+        if not self._plays:
+            self._doubt(now_s, told)
+        return told
+
+    def _doubt(self, now_s: float, told: DeviceSample) -> None:
+        """Raise where no hand does this, or the device cannot know it now."""
+        before, before_s = self._told, self._told_s
+        self._told, self._told_s = told, now_s
+        if told.age_s is not None and not 0.0 <= told.age_s <= SILENT_S:
+            raise _SilentError("is silent: look after the device")
+        for what, vector, largest, unit in (
+            ("moves", told.velocity, FASTEST_M_S, "m/s"),
+            ("turns", told.angular_velocity, FASTEST_RAD_S, "rad/s"),
+            ("pushes", told.wrench, LARGEST_WRENCH, "N"),
+        ):
+            if vector is not None and np.linalg.norm(vector) > largest:
+                raise _NoSampleError(f"{what} with more than {largest:g} {unit}: look after it")
+        if before is None or _differ(before, told) or not (told.dead_man and _works(told)):
+            self._same_since_s = now_s
+        if now_s - self._same_since_s > FROZEN_S:
+            raise _SilentError("has told the very same motion for long: look after the device")
+        if before is None or not (self._gate.open and told.dead_man):
+            return
+        way_m = float(np.linalg.norm(np.subtract(told.position, before.position)))
+        held = not (before.clutch or told.clutch)
+        if held and way_m > FASTEST_M_S * (now_s - before_s) + JUMP_M:
+            raise _NoSampleError(f"jumped by {way_m:.3g} m: look after the device")
+
+
+class _NoSampleError(Exception):
+    """What a source says is no sample of a hand."""
+
+
+class _SilentError(Exception):
+    """A source says nothing new."""
+
+
+def _works(told: DeviceSample) -> bool:
+    pushes = told.wrench is not None and np.linalg.norm(told.wrench) > STILL_N
+    return bool(pushes or np.linalg.norm(told.velocity) > STILL_M_S)
+
+
+def _differ(one: DeviceSample, other: DeviceSample) -> bool:
+    pairs: tuple[tuple[Any, Any], ...] = (
+        (one.position, other.position),
+        (one.velocity, other.velocity),
+        (one.orientation, other.orientation),
+        (one.wrench, other.wrench),
+    )
+    return any(not np.array_equal(before, now) for before, now in pairs)
