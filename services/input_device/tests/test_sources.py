@@ -201,7 +201,7 @@ def test_a_recording_is_played_without_the_devices_that_did_not_drive(tmp_path: 
             fields = maker.fields(motion, number, device)
             recording.write("k", fields, BEGUN_NS + number * PERIOD_NS, None)
     recording.finish()
-    source = opened(source="recording", demonstration=recording.path, lead_in_s=0.0)
-    samples = [source.sample(0.01 * k + 1e-4) for k in range(50)]
+    source = opened(source="recording", demonstration=recording.path, lead_in_s=0.1)
+    samples = [source.sample(0.1 + 0.01 * k + 1e-4) for k in range(50)]
     places_m = [round(sample.position[0], 6) for sample in samples if sample is not None]
     assert places_m == [round(0.001 * k, 6) for k in range(10, 60)]
