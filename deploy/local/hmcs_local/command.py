@@ -326,11 +326,12 @@ def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     The exit code is 0 where each one has done it, else 1.
     """
     from hmcs.bus.messages import Ask
+    from hmcs.bus.verbs import CANCEL
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "trainer", "cancel", Ask(), timeout_s=5.0)
+        replies = ask_everybody(bus, CANCEL, Ask(), timeout_s=5.0)
     raise typer.Exit(_told(replies))
 
 
@@ -357,11 +358,12 @@ def record(
     The exit code is 0 where each one has done it, else 1.
     """
     from hmcs.bus.messages import Record
+    from hmcs.bus.verbs import RECORD
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "recorder", "record", Record(on=not stop, name=name))
+        replies = ask_everybody(bus, RECORD, Record(on=not stop, name=name))
     raise typer.Exit(_told(replies))
 
 
@@ -403,11 +405,12 @@ def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     The exit code is 0 where every input device has done it, else 1.
     """
     from hmcs.bus.messages import Ask
+    from hmcs.bus.verbs import PLAY
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "input_device", "play", Ask())
+        replies = ask_everybody(bus, PLAY, Ask())
     raise typer.Exit(_told(replies))
 
 

@@ -16,10 +16,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from hmcs.bus.keys import ANY, Member
-from hmcs.bus.messages import Ask, Belief, Description
+from hmcs.bus.keys import Member, recognizer_in
+from hmcs.bus.messages import Ask, Belief
 from hmcs.bus.presence import possible
 from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.verbs import DESCRIBE
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.shown import plain
@@ -128,7 +129,7 @@ def active_model(bus: Bus) -> str:
 
 def _followed(bus: Bus) -> dict[str, str]:
     """Return the model that each fixture controller follows, empty for none, by instance."""
-    answers = bus.ask(bus.keys.rpc("fixture_controller", ANY, "describe"), Ask(), Description)
+    answers = DESCRIBE.ask(bus, Ask(), service="fixture_controller")
     return {
         source.instance: answer.body.facts.get("active_model", "")
         for answer in answers
@@ -143,7 +144,7 @@ def watched(bus: Bus, active: str, newcomer: str, watch_s: float) -> Agreement:
 
     def hear(received: Received[Belief]) -> None:
         belief = received.body
-        name = received.key.split("/")[-2]
+        name = recognizer_in(received.key).model
         if name in said:
             said[name][belief.clock, belief.step] = belief.likely_state
 
@@ -254,9 +255,8 @@ def _runner(bus: Bus, model: Model) -> Member | None:
     Raises DeployError where another model of the same name is run: two would speak as one.
     """
     for member in speakers(bus).get(model.name, ()):
-        key = bus.keys.rpc(member.service, member.instance, "describe")
         try:
-            answers = bus.ask(key, Ask(), Description)
+            answers = DESCRIBE.ask(bus, Ask(), service=member.service, instance=member.instance)
         except RequestRefusedError:
             continue
         for answer in answers:

@@ -28,6 +28,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.verbs import STOP
 from hmcs.bus.wire import encode
 from hmcs_local import asking
 from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of, stop_everybody
@@ -337,10 +338,10 @@ def test_trouble_with_one_robot_is_told_as_its_own(
     seen(2)
     ask = observer.ask
 
-    def fail(key: str, *rest: Any) -> Any:
+    def fail(key: str, *rest: Any, **named: Any) -> Any:
         if "/b/" not in key:
             raise zenoh.ZError("no memory")
-        return ask(key, *rest)
+        return ask(key, *rest, **named)
 
     monkeypatch.setattr(observer, "ask", fail)
     replies = stop_everybody(observer, 0.5)
@@ -354,18 +355,18 @@ def test_what_all_of_a_service_did_is_one_line_and_what_some_did_is_an_error(
     observer: Bus, robot: Callable[..., Asked], seen: Callable[[int], None]
 ) -> None:
     with pytest.raises(NobodyAnswersError, match="no robot in cell asked"):
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     robot("b")
     seen(1)
-    assert asked_of(observer, "robot", "stop", Ask()) == "stop is done"
+    assert asked_of(observer, STOP, Ask()) == "stop is done"
     announce(observer, "robot", "a")
     seen(2)
     with pytest.raises(PartlyAnsweredError, match=r"a: did not answer.*; b: stop is done"):
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     robot("c", refusal="not now")
     seen(3)
     with pytest.raises(NobodyAnswersError, match="c: refused: not now") as refused:
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     assert not isinstance(refused.value, PartlyAnsweredError)
 
 

@@ -22,6 +22,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
+from hmcs.bus.verbs import HEALTH, LOOKS
 from hmcs.fixtures.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
@@ -52,6 +53,7 @@ TAKE_EVERY_S = 0.01
 HANDLE_HZ = 30.0
 """How often a held handle is told, however seldom the page is drawn: one that is silent for longer
 than a few of these counts as let go."""
+_EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
 WATCH_EVERY_S = 0.1
 """How often is looked at how a newcomer among the recognizers does."""
@@ -252,8 +254,7 @@ class Console(Service):
 
     def _on_process(self, member: Member) -> None:
         if member.service == "robot":
-            looks = self.bus.keys.rpc(member.service, member.instance, "looks")
-            self._asking.ask(looks, Ask(), RobotLooks, self._on_looks, timeout_s=5.0)
+            self._asking.ask(LOOKS, member, Ask(), self._on_looks, timeout_s=5.0)
 
     def _on_looks(self, answers: list[Answer[RobotLooks]]) -> None:
         for answer in answers[:1]:
@@ -261,8 +262,7 @@ class Console(Service):
 
     def _ask_health(self) -> None:
         if self.page.viewers:
-            key = self.bus.keys.rpc(ANY, ANY, "health")
-            self._asking.ask(key, Ask(), Health, self._on_health, timeout_s=0.5)
+            self._asking.ask(HEALTH, _EVERYBODY, Ask(), self._on_health, timeout_s=0.5)
 
     def _on_health(self, answers: list[Answer[Health]]) -> None:
         told = {

@@ -6,9 +6,9 @@ import logging
 import time
 from collections.abc import Iterator
 
-from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Ask, RobotLooks
 from hmcs.bus.session import Bus
+from hmcs.bus.verbs import LOOKS
 from hmcs.recordings.parts import Preface, Recording
 from hmcs_recorder.prefacing import ask_all
 
@@ -32,8 +32,7 @@ class Robots:
 
     def ask(self) -> None:
         """Ask all that are there."""
-        key = self._bus.keys.rpc("robot", ANY, "looks")
-        for answer in ask_all(self._bus, key, Ask(), RobotLooks):
+        for answer in ask_all(self._bus, LOOKS, Ask()):
             self._looks[answer.body.robot] = answer.body
 
     def kept(self) -> Iterator[Preface]:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from hmcs.bus.messages import Ask, Done, Train, TrainingProgress
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.verbs import CANCEL, TRAIN
 from hmcs_trainer.asked import job_of
 from hmcs_trainer.running import RunningJob
 from hmcs_trainer.settings import TrainerSettings
@@ -45,8 +46,8 @@ class Trainer(Service):
 
     def start(self) -> None:
         """Wait to be asked."""
-        self.bus.answer("train", Train, self._train)
-        self.bus.answer("cancel", Ask, self._cancel)
+        TRAIN.answer(self.bus, self._train)
+        CANCEL.answer(self.bus, self._cancel)
         self.bus.subscribe(TrainingProgress, self.bus.keys.training, self._on_progress)
         self.bus.watch(self.bus.keys.presence(self.name), self._on_trainer)
         self.bus.every(TOLD_EVERY_S, self._look)

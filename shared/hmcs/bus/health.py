@@ -23,6 +23,7 @@ from hmcs.bus.keys import ANY, KeyNameError, Member
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.presence import possible, present
 from hmcs.bus.session import Answer, Bus, BusSettings, BusUnavailableError, RequestRefusedError
+from hmcs.bus.verbs import HEALTH
 from hmcs.shown import plain
 
 ROUTER = "router"
@@ -54,9 +55,15 @@ def _problem(arguments: argparse.Namespace) -> str | None:
             if arguments.service == ROUTER:
                 return None
             keys = bus.keys
-            key = keys.rpc(arguments.service, arguments.instance, "health")
-            tokens = bus.alive(keys.presence(arguments.service, arguments.instance))
-            answers = bus.ask(key, Ask(), Health, arguments.timeout)
+            asked = Member(arguments.service, arguments.instance)
+            tokens = bus.alive(keys.presence(*asked))
+            answers = HEALTH.ask(
+                bus,
+                Ask(),
+                service=asked.service,
+                instance=asked.instance,
+                timeout_s=arguments.timeout,
+            )
     except BusUnavailableError as error:
         return str(error)
     except RequestRefusedError as error:
@@ -80,7 +87,7 @@ def _problem(arguments: argparse.Namespace) -> str | None:
         ),
     ]
     if not told and not problems:
-        return f"nobody answered on {key} {within}"
+        return f"nobody answered on {keys.rpc(*asked, HEALTH.name)} {within}"
     return "; ".join(problems) or None
 
 

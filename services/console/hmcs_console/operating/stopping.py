@@ -59,7 +59,7 @@ class Stopping:
         def failed(reason: str) -> None:
             come(Markdown("**may still move**: {}").format(reason))
 
-        self._asking.request(robot, STOP.name, Ask(), come, failed, ANSWERS_WITHIN_S)
+        self._asking.request(robot, STOP, Ask(), come, failed, ANSWERS_WITHIN_S)
 
     def _come(self, robot: Member, tell: Callable[[str], None], what: str) -> None:
         if robot in self._came:
