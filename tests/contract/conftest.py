@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
-from pydantic import BaseModel
+from pydantic import AfterValidator, BaseModel
 
 from hmcs.bus.arrays import LARGEST, ArraySpec
 from hmcs.bus.messages import Envelope, Message, Within
@@ -100,6 +100,8 @@ def _scalar(annotation: Any, metadata: list[Any]) -> Any_:
         low = -most if low is None and most is not None else low
         return st.floats(low, most if high is None else high, allow_nan=False, allow_infinity=False)
     if annotation is str:
+        if any(isinstance(rule, AfterValidator) for rule in metadata):
+            return st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", fullmatch=True)
         shortest = bound(annotated_types.MinLen, "min_length") or 0
         return st.text(min_size=shortest, max_size=bound(annotated_types.MaxLen, "max_length") or 9)
     if annotation is type(None):

@@ -15,8 +15,8 @@ import yaml
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Belief, FixtureState
 from hmcs.bus.session import Bus, Received
+from hmcs_local.connecting import open_operator
 from hmcs_local.control import Control, ControlServer
-from hmcs_local.observer import open_observer
 from hmcs_local.stack import LocalStack
 from support.stack import DEADLINE_S
 
@@ -39,7 +39,7 @@ class Running:
         """Do what another command would do, while everything that is said is kept."""
         with (
             ControlServer(self.stack) as server,
-            open_observer(self.stack.router, CELL) as watcher,
+            open_operator(self.stack.router, CELL) as watcher,
             ThreadPoolExecutor(1) as other,
         ):
             keys = watcher.keys
@@ -48,7 +48,7 @@ class Running:
             watcher.listen(keys.command, self.commands.append)
 
             def apart() -> Any:
-                with open_observer(self.stack.router, CELL) as bus:
+                with open_operator(self.stack.router, CELL) as bus:
                     return act(bus)
 
             result = other.submit(apart)
@@ -92,7 +92,7 @@ def brought_up(folder: Path, performance_file: Path) -> Iterator[Running]:
 def _until_present(router: str, services: set[str]) -> None:
     """Wait until everybody is there."""
     deadline_s = time.monotonic() + DEADLINE_S
-    with open_observer(router, CELL) as bus:
+    with open_operator(router, CELL) as bus:
         while not services <= {
             bus.keys.member_of(k).service for k in bus.alive(bus.keys.presence())
         }:

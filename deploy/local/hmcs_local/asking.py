@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import Ask, Done, Message, StopRequest
-from hmcs.bus.presence import Present, possible, present
+from hmcs.bus.presence import Present
 from hmcs.bus.session import Answer, Bus, RequestRefusedError
 from hmcs.bus.verbs import STOP, Verb
 from hmcs.errors import UserError
@@ -67,7 +67,7 @@ def ask_everybody(
     NobodyAnswersError where none is present.
     """
     service = service or verb.services[0]
-    there = present(bus.keys, bus.alive(bus.keys.presence(service)))
+    there = bus.present(bus.keys.presence(service))
     if not there.members:
         raise _nobody(bus, service, there.strangers)
     return Replies(_asked(bus, there.members, verb, question, timeout_s), there.strangers)
@@ -110,7 +110,7 @@ def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
     replies = {reply.member: reply for reply in by_name}
     for answer in of_all.result() if of_all.exception() is None else ():
         member = _sender(answer)
-        is_robot = member.service == "robot" and possible(member)
+        is_robot = member.service == "robot"
         if is_robot and not (member in replies and replies[member].done):
             replies[member] = Reply(member, True, answer.body.detail)
     if not replies:
@@ -119,7 +119,7 @@ def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
 
 
 def _stop_by_name(bus: Bus, timeout_s: float) -> tuple[Present, tuple[Reply, ...]]:
-    there = present(bus.keys, bus.alive(bus.keys.presence("robot")))
+    there = bus.present(bus.keys.presence("robot"))
     return there, _asked(bus, there.members, STOP, Ask(), timeout_s, again=True)
 
 

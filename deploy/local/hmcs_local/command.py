@@ -16,6 +16,7 @@ from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs.shown import plain
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+from hmcs_secure.command import app as secure_app
 
 if TYPE_CHECKING:
     from hmcs_local.asking import Replies
@@ -32,12 +33,22 @@ app = typer.Typer(
 )
 task_app = typer.Typer(help="Work with task files.", no_args_is_help=True)
 app.add_typer(task_app, name="task")
+app.add_typer(secure_app, name="secure")
 
 _Router = Annotated[
     str, typer.Option(envvar="HMCS_ROUTER", metavar="ENDPOINT", help="Where the router is.")
 ]
 _Cell = Annotated[
     str, typer.Option(envvar="HMCS_CELL", metavar="NAME", help="Which operator and robot.")
+]
+_Secure = Annotated[
+    str | None,
+    typer.Option(
+        envvar="HMCS_SECURE",
+        metavar="CELL",
+        help="The closed cell of this name, or the folder of its certificates, see `hmcs secure`; "
+        "in place of --cell.",
+    ),
 ]
 _Open = Annotated[
     bool,
@@ -78,13 +89,30 @@ def up(
     ] = None,
     folder: _Folder = DEFAULT_FOLDER,
     open_to_network: _Open = False,
+    secure: _Secure = None,
+    signed_models: Annotated[
+        bool,
+        typer.Option(
+            "--signed-models",
+            help="With --secure: no process loads a model that is not signed for the cell, see "
+            "`hmcs secure sign`.",
+        ),
+    ] = False,
 ) -> None:
     """Run the stack of compose.yaml as processes here, with the router embedded.
 
+    With --secure every process comes with its certificate, and the router refuses everybody else.
     Ctrl-C ends them all. `${NAME}` in compose.yaml is taken from the environment.
     """
     from hmcs_local.launcher import run_up
+    from hmcs_secure.closed_cell import find_closed_cell
+    from hmcs_secure.router_file import DEFAULT_LISTEN
 
+    if signed_models and not secure:
+        raise UserError("--signed-models: name the closed cell whose key counts, by --secure")
+    closed = find_closed_cell(secure, signed_models=signed_models) if secure else None
+    if closed is not None and router == DEFAULT_ROUTER:
+        router = DEFAULT_LISTEN
     chosen = tuple(name.strip() for name in services.split(",") if name.strip())
     console = Console(highlight=False, soft_wrap=True)
     code = run_up(
@@ -95,6 +123,7 @@ def up(
             router=router,
             folder=folder,
             open_to_network=open_to_network,
+            closed=closed,
             while_waiting=while_waiting,
         ),
         lambda who, what: console.print(_line(who, what)),
@@ -107,16 +136,17 @@ def status(
     once: Annotated[bool, typer.Option("--once", help="Show it once and end.")] = False,
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
 ) -> None:
     """Show who is there, how each is, rates, losses and the active model, and whether it is run.
 
     With --once, the exit code is 0 when somebody is there, everybody is healthy and somebody runs
     the model that is followed, else 1.
     """
-    from hmcs_local.observer import open_observer
+    from hmcs_local.connecting import open_observer
     from hmcs_local.status import show_status
 
-    with open_observer(router, cell) as bus:
+    with open_observer(router, cell, secure) as bus:
         well = show_status(bus, Console(), once=once)
     raise typer.Exit(0 if well else 1)
 
@@ -142,6 +172,7 @@ def swap(
     ] = "",
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
     folder: _Folder = DEFAULT_FOLDER,
 ) -> None:
     """Replace a classifier, or activate another recognizer, while the stack runs.
@@ -155,13 +186,13 @@ def swap(
     already, in the shadow of the active one. The exit code is 1 where only some fixtures answer.
     """
     from hmcs_local import swap as swapping
+    from hmcs_local.connecting import open_operator
     from hmcs_local.control import Control
     from hmcs_local.interrupts import interruptible
-    from hmcs_local.observer import open_observer
 
     if bool(instance) == bool(activate) or (command and not instance) or (load and instance):
         raise UserError("name either a classifier to replace or a model to --activate")
-    with interruptible(), open_observer(router, cell) as bus:
+    with interruptible(), open_operator(router, cell, secure) as bus:
         if instance:
             swapping.replace_classifier(
                 bus, Control(folder), instance, command=shlex.split(command), tell=typer.echo
@@ -192,6 +223,7 @@ def deploy(
     ] = 5.0,
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
     folder: _Folder = DEFAULT_FOLDER,
 ) -> None:
     """Let a newly trained model take over while the operator moves, or return to the one before.
@@ -201,15 +233,15 @@ def deploy(
     --folder.
     """
     from hmcs_local import deploying
+    from hmcs_local.connecting import open_operator
     from hmcs_local.control import Control
     from hmcs_local.interrupts import interruptible
-    from hmcs_local.observer import open_observer
     from hmcs_local.swap import PartlySwappedError
 
     if (model is None) != back:
         raise UserError("name either a model file or --back")
     control = Control(folder)
-    with interruptible(), open_observer(router, cell) as bus:
+    with interruptible(), open_operator(router, cell, secure) as bus:
         try:
             if model is None:
                 typer.echo(f"back to {deploying.back(bus, control, folder, typer.echo)}")
@@ -320,7 +352,7 @@ def train(
 
 
 @app.command()
-def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo", secure: _Secure = None) -> None:
     """Let every trainer of a cell give up what it was asked to train; no model is written.
 
     The exit code is 0 where each one has done it, else 1.
@@ -328,9 +360,9 @@ def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     from hmcs.bus.messages import Ask
     from hmcs.bus.verbs import CANCEL
     from hmcs_local.asking import ask_everybody
-    from hmcs_local.observer import open_observer
+    from hmcs_local.connecting import open_operator
 
-    with open_observer(router, cell) as bus:
+    with open_operator(router, cell, secure) as bus:
         replies = ask_everybody(bus, CANCEL, Ask(), timeout_s=5.0)
     raise typer.Exit(_told(replies))
 
@@ -352,6 +384,7 @@ def record(
     stop: Annotated[bool, typer.Option("--stop", help="End the recording.")] = False,
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
 ) -> None:
     """Let every recorder begin a recording, or end it.
 
@@ -360,9 +393,9 @@ def record(
     from hmcs.bus.messages import Record
     from hmcs.bus.verbs import RECORD
     from hmcs_local.asking import ask_everybody
-    from hmcs_local.observer import open_observer
+    from hmcs_local.connecting import open_operator
 
-    with open_observer(router, cell) as bus:
+    with open_operator(router, cell, secure) as bus:
         replies = ask_everybody(bus, RECORD, Record(on=not stop, name=name))
     raise typer.Exit(_told(replies))
 
@@ -374,32 +407,33 @@ def mark(
     ] = "",
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
 ) -> None:
     """Say which part of the task the hand is in from now on; the recorder writes it down."""
+    from hmcs_local.connecting import open_operator
     from hmcs_local.marking import mark as say
-    from hmcs_local.observer import open_observer
 
-    with open_observer(router, cell) as bus:
+    with open_operator(router, cell, secure) as bus:
         typer.echo(say(bus, state))
 
 
 @app.command()
-def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo", secure: _Secure = None) -> None:
     """Let every robot stand, whoever drives it, until its operator lets go and takes hold again.
 
     An operator that is played or simulated waits for `hmcs play`. All robots are asked at once. The
     exit code is 0 where every one that is present says that it stands, else 1.
     """
     from hmcs_local.asking import stop_everybody
-    from hmcs_local.observer import open_observer
+    from hmcs_local.connecting import open_operator
 
-    with open_observer(router, cell) as bus:
+    with open_operator(router, cell, secure) as bus:
         replies = stop_everybody(bus)
     raise typer.Exit(_told(replies))
 
 
 @app.command()
-def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
+def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo", secure: _Secure = None) -> None:
     """Let an operator that is played or simulated begin, or go on where it let go for a stop.
 
     The exit code is 0 where every input device has done it, else 1.
@@ -407,9 +441,9 @@ def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     from hmcs.bus.messages import Ask
     from hmcs.bus.verbs import PLAY
     from hmcs_local.asking import ask_everybody
-    from hmcs_local.observer import open_observer
+    from hmcs_local.connecting import open_operator
 
-    with open_observer(router, cell) as bus:
+    with open_operator(router, cell, secure) as bus:
         replies = ask_everybody(bus, PLAY, Ask())
     raise typer.Exit(_told(replies))
 

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 from hmcs.bus.keys import Member, recognizer_in
 from hmcs.bus.messages import Ask, Belief
-from hmcs.bus.presence import possible
 from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import DESCRIBE
 from hmcs.recognition.model import Model
@@ -134,7 +133,6 @@ def _followed(bus: Bus) -> dict[str, str]:
         source.instance: answer.body.facts.get("active_model", "")
         for answer in answers
         if (source := answer.envelope.source).service == "fixture_controller"
-        and possible(Member(source.service, source.instance))
     }
 
 

@@ -1,22 +1,15 @@
-"""A place on the bus for commands that ask and watch, and take part in nothing."""
+"""Who is there and how each is, at one moment."""
 
 from __future__ import annotations
 
-import logging
-import os
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from pydantic import ValidationError
-
-from hmcs.bus.keys import ANY, KeyNameError, Keys, Member
+from hmcs.bus.keys import ANY, Keys, Member
 from hmcs.bus.messages import Ask, Envelope, Health
-from hmcs.bus.presence import member_named, model_named, possible, present
-from hmcs.bus.session import Bus, BusSettings
+from hmcs.bus.session import Bus
 from hmcs.bus.verbs import DESCRIBE, HEALTH
-from hmcs.errors import UserError
 
-_CONNECT_TIMEOUT_S = 3.0
 _ANSWER_TIMEOUT_S = 0.5
 
 
@@ -33,18 +26,6 @@ class Sighting(NamedTuple):
     health: Health | None
     """None where it is present and does not answer."""
     facts: dict[str, str]
-
-
-def open_observer(router: str, cell: str) -> Bus:
-    """Join the bus to look at it; raises UserError where there is no router or names are wrong."""
-    try:
-        settings = BusSettings(router=router, cell=cell, connect_timeout_s=_CONNECT_TIMEOUT_S)
-    except (ValidationError, KeyNameError) as error:
-        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
-        raise UserError(reason) from None
-    quiet = logging.Logger("observer")
-    quiet.addHandler(logging.NullHandler())
-    return Bus.open(settings, "observer", f"pid-{os.getpid()}", log=quiet)
 
 
 class Observation(NamedTuple):
@@ -66,17 +47,14 @@ def look(bus: Bus) -> list[Sighting]:
 def observe(bus: Bus) -> Observation:
     """Return who is there, how each is, and which models they speak for."""
     keys = bus.keys
-    there = present(keys, bus.alive(keys.presence()))
-    at_work = bus.alive(keys.member(ANY))
+    there, at_work = bus.present(keys.presence()), bus.present(keys.member(ANY))
     healths = {
-        sender: answer.body
+        _sender(answer.envelope): answer.body
         for answer in HEALTH.ask(bus, Ask(), timeout_s=_ANSWER_TIMEOUT_S)
-        if (sender := _sender(answer.envelope)) is not None
     }
     facts = {
-        sender: answer.body.facts
+        _sender(answer.envelope): answer.body.facts
         for answer in DESCRIBE.ask(bus, Ask(), timeout_s=_ANSWER_TIMEOUT_S)
-        if (sender := _sender(answer.envelope)) is not None
     }
     silent = set(there.members) - {member for member, _ in healths}
     everybody = sorted([*healths, *((member, "") for member in silent)])
@@ -85,8 +63,8 @@ def observe(bus: Bus) -> Observation:
             Sighting(member, boot, healths.get((member, boot)), facts.get((member, boot), {}))
             for member, boot in everybody
         ),
-        speakers=_speakers(keys, at_work),
-        strangers=(*there.strangers, *present(keys, at_work).strangers),
+        speakers=_speakers(keys, at_work.tokens),
+        strangers=(*there.strangers, *at_work.strangers),
     )
 
 
@@ -98,14 +76,12 @@ def speakers(bus: Bus) -> dict[str, tuple[Member, ...]]:
 def _speakers(keys: Keys, tokens: Iterable[str]) -> dict[str, tuple[Member, ...]]:
     found: dict[str, list[Member]] = {}
     for token in tokens:
-        member = member_named(keys, token)
-        if member is not None and member.service != CLASSIFIER:
-            found.setdefault(model_named(keys, token), []).append(member)
+        if (member := keys.member_of(token)).service != CLASSIFIER:
+            found.setdefault(keys.model_of(token), []).append(member)
     return {model: tuple(sorted(members)) for model, members in sorted(found.items())}
 
 
-def _sender(envelope: Envelope) -> tuple[Member, str] | None:
-    """Return who sent an answer and in which life; None for a name nobody can bear."""
+def _sender(envelope: Envelope) -> tuple[Member, str]:
+    """Return who sent an answer and in which life."""
     source = envelope.source
-    member = Member(source.service, source.instance)
-    return (member, source.boot) if possible(member) else None
+    return Member(source.service, source.instance), source.boot

@@ -21,6 +21,7 @@ from hmcs.bus.router import open_router
 from hmcs.errors import UserError
 from hmcs_local.compose import ROUTER, ServiceSpec, StackSpec, find_compose, load_compose
 from hmcs_local.processes import StackProcess
+from hmcs_secure.closed_cell import ClosedCell
 
 ROUTER_IN_COMPOSE = "tcp/router:7447"
 """Where the services of compose.yaml look for the router; here it is the launcher's own."""
@@ -50,10 +51,12 @@ class LocalStack:
     a free port is chosen and `stack.router` tells it. Every volume of compose.yaml is a folder of
     `folder`, which also holds `logs/INSTANCE.log`. `variables` fill in `${NAME}` in compose.yaml
     and default to this process' environment; HMCS_* variables reach the services no other way.
-    `open_to_network` lets the embedded router listen beyond this machine without TLS.
+    `open_to_network` lets the embedded router listen beyond this machine without TLS. `closed` is
+    the closed cell this is: every process comes with its certificate, and the router, at a tls
+    endpoint, refuses everybody else.
     `while_waiting` is called again and again while a one-shot runs.
 
-    Raises ComposeError, StackError and RouterError for what the user can mend, and
+    Raises ComposeError, StackError, AuthorityError and RouterError for what the user can mend, and
     OneShotFailedError where a one-shot does not end with 0. Not for use from several threads: the
     processes die with the thread that started them.
     """
@@ -69,11 +72,17 @@ class LocalStack:
         environment: Mapping[str, Mapping[str, str]] | None = None,
         variables: Mapping[str, str] | None = None,
         open_to_network: bool = False,
+        closed: ClosedCell | None = None,
         while_waiting: Callable[[], None] = lambda: None,
     ) -> None:
         path = compose or find_compose(Path.cwd())
         self.spec: StackSpec = load_compose(path, os.environ if variables is None else variables)
         self.router = with_free_port(router)
+        self._closed = closed
+        if closed is not None and not self.router.startswith("tls/"):
+            raise StackError(
+                f"--router {router}: the router of a closed cell listens on tls/HOST:PORT"
+            )
         self.folder = folder.resolve()
         self.processes: dict[str, StackProcess] = {}
         """Every service instance started, by instance name; also those that have ended."""
@@ -141,7 +150,13 @@ class LocalStack:
     def start_router(self) -> None:
         """Start the embedded router; raises RouterError where its port is taken."""
         if self._router_session is None:
-            self._router_session = open_router(self.router, open_to_network=self._open_to_network)
+            file = None
+            if self._closed is not None:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                file = self._closed.write_router(self.folder / "router.json5", self.router)
+            self._router_session = open_router(
+                self.router, file, open_to_network=self._open_to_network
+            )
 
     def stop_router(self) -> None:
         """Close the embedded router; nothing where there is none."""
@@ -257,12 +272,16 @@ class LocalStack:
     ) -> dict[str, str]:
         inherited = {k: v for k, v in os.environ.items() if not k.startswith("HMCS_")}
         named = {"HMCS_INSTANCE": instance} if "HMCS_ROUTER" in spec.environment else {}
+        closed: dict[str, str] = {}
+        if named and self._closed is not None:
+            closed = self._closed.environment(spec.name.replace("-", "_"), instance)
         composed = {key: self._local(spec, value) for key, value in spec.environment.items()}
         return {
             "OMP_NUM_THREADS": "1",
             **inherited,
             **composed,
             **named,
+            **closed,
             **self._environment.get(spec.name, {}),
             **more,
         }

@@ -9,7 +9,6 @@ from typing import TypeVar
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
 from hmcs.bus.messages import ActivateRecognizer, Done, LoadModel, Message
-from hmcs.bus.presence import present
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import ACTIVATE, LOAD_MODEL, Verb
 from hmcs.errors import UserError
@@ -157,5 +156,4 @@ def until_ready(
 
 
 def _members(bus: Bus) -> set[str]:
-    there = present(bus.keys, bus.alive(bus.keys.member(ANY, CLASSIFIER)))
-    return {member.instance for member in there.members}
+    return {member.instance for member in bus.present(bus.keys.member(ANY, CLASSIFIER)).members}

@@ -32,7 +32,7 @@ from hmcs.bus.verbs import STOP
 from hmcs.bus.wire import encode
 from hmcs_local import asking
 from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of, stop_everybody
-from hmcs_local.observer import open_observer
+from hmcs_local.connecting import open_operator
 from hmcs_local.stack import with_free_port
 
 CELL = "asked"
@@ -106,14 +106,19 @@ def robot(router: str) -> Iterator[Callable[..., Asked]]:
 
 @pytest.fixture
 def observer(router: str) -> Iterator[Bus]:
-    with open_observer(router, CELL) as bus:
+    with open_operator(router, CELL) as bus:
         yield bus
 
 
 @pytest.fixture
 def seen(observer: Bus, eventually: Eventually) -> Callable[[int], None]:
     """Wait until so many tokens of presence are there."""
-    return lambda count: eventually(lambda: len(observer.alive(observer.keys.presence())) == count)
+
+    def shown() -> int:
+        there = observer.present(observer.keys.presence())
+        return len(there.tokens) + len(there.strangers)
+
+    return lambda count: eventually(lambda: shown() == count)
 
 
 def announce(observer: Bus, service: str, name: str) -> None:
@@ -319,7 +324,7 @@ def test_one_that_answers_in_a_robots_place_is_not_that_robot(
         with query:
             query.reply(key, encode(Done(detail="stands"), Envelope(source=source, seq=0)))
 
-    with open_observer(router, CELL) as stranger:
+    with open_operator(router, CELL) as stranger:
         stranger._declared.append(stranger._session.declare_queryable(key, pretend))
         seen(1)
         replies = {r.member: r.done for r in stop_everybody(observer, 0.5).each}

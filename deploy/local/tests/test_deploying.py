@@ -23,6 +23,7 @@ from hmcs.bus.wire import encode
 from hmcs.recognition.model_file import load_model, save_model
 from hmcs.task import Task
 from hmcs_local import deploying, swap
+from hmcs_local.connecting import open_operator
 from hmcs_local.control import Control, ControlError
 from hmcs_local.deploying import (
     Agreement,
@@ -35,7 +36,6 @@ from hmcs_local.deploying import (
     read_history,
     write_history,
 )
-from hmcs_local.observer import open_observer
 from hmcs_local.stack import LocalStack
 from hmcs_local.swap import PartlySwappedError, SwapError
 from support.made_up import line_model
@@ -95,7 +95,7 @@ def stack(
 
 @pytest.fixture
 def bus(stack: LocalStack) -> Iterator[Bus]:
-    with open_observer(stack.router, CELL) as bus:
+    with open_operator(stack.router, CELL) as bus:
         yield bus
 
 
@@ -255,7 +255,7 @@ def test_what_a_stranger_says_that_it_follows_is_not_what_fixtures_follow(
         with query:
             query.reply(key, encode(said, Envelope(source=stranger, seq=0)))
 
-    with open_observer(stack.router, CELL) as other:
+    with open_operator(stack.router, CELL) as other:
         other._declared.append(other._session.declare_queryable(key, pretend))
         assert active_model(bus) == "mine"
 

@@ -11,7 +11,8 @@ from hmcs.bus.keys import Member
 from hmcs.bus.messages import Health
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, Token
-from hmcs_local.observer import Sighting, observe, open_observer
+from hmcs_local.connecting import open_observer
+from hmcs_local.observer import Sighting, observe
 from hmcs_local.stack import with_free_port
 from hmcs_local.status import active_model, remarks, remembering, row, show_status
 

@@ -10,8 +10,9 @@ import pytest
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus
 from hmcs_local import swap
+from hmcs_local.connecting import open_operator
 from hmcs_local.control import Control, ControlError
-from hmcs_local.observer import open_observer, speakers
+from hmcs_local.observer import speakers
 from hmcs_local.stack import LocalStack, with_free_port
 from hmcs_local.swap import PartlySwappedError, SwapError, activate, replace_classifier
 
@@ -39,7 +40,7 @@ def stack(
 
 @pytest.fixture
 def bus(stack: LocalStack, eventually: Eventually) -> Iterator[Bus]:
-    with open_observer(stack.router, CELL) as bus:
+    with open_operator(stack.router, CELL) as bus:
         member = bus.keys.member("*", "gesteme_classifier")
         eventually(lambda: len(bus.alive(member)) == len(stack.instances("gesteme-classifier")))
         yield bus
@@ -84,7 +85,7 @@ def test_only_a_classifier_at_work_that_up_has_started_is_replaced(
     control = Control(stack.folder)
     with pytest.raises(SwapError, match=f"no classifier 'robot-1' .* choose from {OLD}"):
         served(stack, lambda: replace_classifier(bus, control, "robot-1"))
-    with open_observer(stack.router, CELL) as other:
+    with open_operator(stack.router, CELL) as other:
         other.announce(other.keys.member("fake", "gesteme_classifier", "elsewhere"))
         with pytest.raises(SwapError, match="elsewhere was not started by"):
             served(stack, lambda: replace_classifier(bus, control, "elsewhere"))
@@ -93,7 +94,7 @@ def test_only_a_classifier_at_work_that_up_has_started_is_replaced(
 @pytest.fixture
 def empty_bus() -> Iterator[Bus]:
     router = with_free_port("tcp/127.0.0.1:0")
-    with open_router(router), open_observer(router, CELL) as bus:
+    with open_router(router), open_operator(router, CELL) as bus:
         yield bus
 
 

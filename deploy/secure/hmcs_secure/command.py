@@ -23,10 +23,10 @@ from hmcs_secure.authority import (
     readable_by_others,
     utc_now,
 )
+from hmcs_secure.closed_cell import DEFAULT_FOLDER
 from hmcs_secure.identity import ROUTER, Identity
 from hmcs_secure.router_file import DEFAULT_LISTEN, write_router_file
 
-DEFAULT_FOLDER = Path("secure")
 RENEW_DAYS = 30
 """A certificate with fewer days left is to be renewed."""
 

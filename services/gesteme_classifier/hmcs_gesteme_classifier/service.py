@@ -6,9 +6,7 @@ import logging
 import time
 from collections import deque
 
-from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import Evidence
-from hmcs.bus.presence import TOKEN, member_named, present
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
@@ -42,7 +40,6 @@ class GestemeClassifier(Service):
         self._peers = {bus.source.instance}
         self._living = {bus.source.instance}
         """Peers whose tokens the watch has told of, and not yet that they went."""
-        self._seldom = Seldom(log)
         # One more than is scored: how the hand turns in a step is told by the step before it.
         memory_steps = layers_of(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
@@ -62,8 +59,8 @@ class GestemeClassifier(Service):
             self._hold(self._named)
             self._feed.begin()
         else:
-            there = present(self.bus.keys, self.bus.alive(self._peers_key))
-            self._peers.update(peer.instance for peer in there.members)
+            there = self.bus.present(self._peers_key).members
+            self._peers.update(peer.instance for peer in there)
             self._hold(self._share())
             self._feed.begin()
             self.bus.announce(
@@ -100,11 +97,8 @@ class GestemeClassifier(Service):
         self.log.info("beginning anew", extra={"step": index})
 
     def _on_peer(self, token: str, alive: bool) -> None:
-        peer = member_named(self.bus.keys, token)
-        if peer is None:
-            self.bus.counters.count_refused(TOKEN)
-            self._seldom.warning("token", "a peer of an impossible name is no peer", token=token)
-        elif peer.instance != self.bus.source.instance:
+        peer = self.bus.keys.member_of(token)
+        if peer.instance != self.bus.source.instance:
             for known in (self._peers, self._living):
                 (known.add if alive else known.discard)(peer.instance)
             # First of all, so that nothing that goes wrong below keeps it from being done.

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.bus.presence import TOKEN
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings
 from hmcs.recognition.model_file import save_model
@@ -169,11 +168,11 @@ def test_a_token_of_an_impossible_name_is_counted_and_is_no_peer(
     token = stranger.keys.member(MODEL, "gesteme_classifier", "x").removesuffix("x") + name
     if when == "before":
         stranger.announce(token)
-        pump_until(bus, lambda: bus.alive(bus.keys.member(MODEL)))
+        pump_until(bus, lambda: bus.present(bus.keys.member(MODEL)).strangers)
     service.start()
     if when == "after":
         stranger.announce(token)
-    pump_until(bus, lambda: bus.counters.refused[TOKEN])
+    pump_until(bus, lambda: bus.counters.refused["presence"])
     assert held(service) == set(GESTEMES)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ipaddress
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -35,6 +36,7 @@ OPEN_TO_NETWORK = "--open-to-network, or HMCS_OPEN_TO_NETWORK=true"
 
 _LOOPBACK = "tcp/127.0.0.1:0"
 _EVERYWHERE = "tcp/[::]:0"
+_TLS_FILES = ("tls_ca", "tls_certificate", "tls_key")
 _ENCRYPTED = ("tls", "quic")
 _WITHIN_THIS_MACHINE = ("unixsock-stream", "unixpipe")
 
@@ -82,6 +84,15 @@ class BusSettings(BaseModel):
         return check_name("cell", cell)
 
 
+def tls_files(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the settings of TLS that HMCS_* variables name: for processes without a settings file.
+
+    A variable that is set to nothing sets nothing.
+    """
+    named = {name: environment.get(f"HMCS_{name.upper()}", "") for name in _TLS_FILES}
+    return {name: value for name, value in named.items() if value}
+
+
 def check_endpoint(endpoint: str) -> str:
     """Return `endpoint` if it reads `protocol/address`; raises ValueError otherwise."""
     if not _ENDPOINT.fullmatch(endpoint):
@@ -108,11 +119,7 @@ class TlsSettings(Protocol):
 
 def check_tls(settings: TlsSettings) -> None:
     """Raise ValueError for settings of TLS that are not whole or contradict each other."""
-    files = {
-        "tls_ca": settings.tls_ca,
-        "tls_certificate": settings.tls_certificate,
-        "tls_key": settings.tls_key,
-    }
+    files: dict[str, Path | None] = {name: getattr(settings, name) for name in _TLS_FILES}
     missing = [name for name, file in files.items() if file is None]
     if len(missing) == len(files):
         if settings.router.startswith("tls/"):

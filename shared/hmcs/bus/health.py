@@ -2,9 +2,9 @@
 
 Exits with 0 where it answers that it is healthy, with 1 and one line why otherwise, with 2 for a
 mistake in the question. Router, cell and instance are taken from HMCS_ROUTER, HMCS_CELL and
-HMCS_INSTANCE unless given; without an instance every one of the service that is present must
-answer and be healthy. The service `router` is the router itself: it is healthy when a session with
-it opens.
+HMCS_INSTANCE unless given, certificates from HMCS_TLS_CA, HMCS_TLS_CERTIFICATE and HMCS_TLS_KEY;
+without an instance every one of the service that is present must answer and be healthy. The service
+`router` is the router itself: it is healthy when a session with it opens.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from operator import itemgetter
 
 from pydantic import ValidationError
 
-from hmcs.bus.config import DEFAULT_ROUTER
+from hmcs.bus.config import DEFAULT_ROUTER, tls_files
 from hmcs.bus.keys import ANY, KeyNameError, Member
 from hmcs.bus.messages import Ask, Health
-from hmcs.bus.presence import possible, present
 from hmcs.bus.session import Answer, Bus, BusSettings, BusUnavailableError, RequestRefusedError
 from hmcs.bus.verbs import HEALTH
 from hmcs.shown import plain
@@ -46,7 +45,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _problem(arguments: argparse.Namespace) -> str | None:
     settings = BusSettings(
-        router=arguments.router, cell=arguments.cell, connect_timeout_s=arguments.timeout
+        router=arguments.router,
+        cell=arguments.cell,
+        connect_timeout_s=arguments.timeout,
+        **tls_files(os.environ),
     )
     quiet = logging.Logger("health")
     quiet.addHandler(logging.NullHandler())
@@ -56,7 +58,7 @@ def _problem(arguments: argparse.Namespace) -> str | None:
                 return None
             keys = bus.keys
             asked = Member(arguments.service, arguments.instance)
-            tokens = bus.alive(keys.presence(*asked))
+            there = bus.present(keys.presence(*asked)).members
             answers = HEALTH.ask(
                 bus,
                 Ask(),
@@ -72,12 +74,12 @@ def _problem(arguments: argparse.Namespace) -> str | None:
     told = {
         member: answer.body
         for answer in answers
-        if possible(member := _sender(answer)) and member.service == arguments.service
+        if (member := _sender(answer)).service == arguments.service
     }
     problems = [
         *(
             f"{member.instance}: is present, but did not answer {within}"
-            for member in present(keys, tokens).members
+            for member in there
             if member not in told
         ),
         *(

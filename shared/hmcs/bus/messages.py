@@ -17,9 +17,10 @@ step s as its first and x_s as its origin.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler
 from pydantic_core import core_schema
 
 from hmcs.bus.arrays import (
@@ -32,6 +33,7 @@ from hmcs.bus.arrays import (
     Vector3,
     Vector6,
 )
+from hmcs.bus.keys import check_name
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class Within:
 
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
+Chunk = Annotated[Name, AfterValidator(partial(check_name, "name"))]
+"""What can be one chunk of a key, such as the name of a process."""
 Count = Annotated[int, Field(ge=0), Within(2**53)]
 """Nothing counts further: a thousand a second for 285 000 years. Sums of counts still fit into a
 message."""
@@ -82,18 +86,18 @@ class Message(Part):
 class Source(Part):
     """Who sent a message."""
 
-    service: Name
+    service: Chunk
     """Kind of process, e.g. `gesteme_classifier`."""
-    instance: Name
+    instance: Chunk
     """Which one of its kind."""
-    boot: Name
+    boot: Chunk
     """A new value at every start of the process: sequence numbers count within one boot."""
 
 
 class Origin(Part):
     """The operator sample that caused a message, handed on from hop to hop."""
 
-    boot: Name
+    boot: Chunk
     """Boot of the input device that captured the sample."""
     seq: Count
     """Sequence number of its Motion."""

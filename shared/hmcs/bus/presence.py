@@ -1,7 +1,6 @@
 """Who is there, by the liveliness tokens that are there.
 
-Anybody may declare a token of any name. Who reads tokens takes the processes they can stand for
-from here; what bears an impossible name is no process, and is nobody's reason to end.
+Anybody may show a token of any name; one with an impossible name is no process.
 """
 
 from __future__ import annotations
@@ -9,10 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from hmcs.bus.keys import PREFIX, KeyNameError, Keys, Member, check_name
-
-TOKEN = "token"
-"""What tokens of impossible names are counted under, beside the schemas of refused messages."""
+from hmcs.bus.keys import PREFIX, KeyNameError, Keys, Member, is_name
 
 
 class Present(NamedTuple):
@@ -20,40 +16,27 @@ class Present(NamedTuple):
 
     members: tuple[Member, ...]
     """Sorted, each once."""
+    tokens: tuple[str, ...]
+    """Their tokens, sorted."""
     strangers: tuple[str, ...]
-    """Keys of tokens that no process can have declared."""
+    """Tokens that no process can show, sorted."""
 
 
-def member_named(keys: Keys, token: str) -> Member | None:
-    """Return the process a presence or member token stands for; None if its name is impossible."""
+def is_token(keys: Keys, token: str) -> bool:
+    """Return whether a key is that of a presence or member token of the cell."""
     try:
-        for chunk in token.removeprefix(f"{PREFIX}/{keys.cell}/").split("/"):
-            check_name("token", chunk)
-        return keys.member_of(token)
-    except KeyNameError:
-        return None
-
-
-def possible(member: Member) -> bool:
-    """Return whether a process can be called so: an answer may say anything of its sender."""
-    try:
-        check_name("service", member.service)
-        check_name("instance", member.instance)
+        keys.member_of(token)
     except KeyNameError:
         return False
-    return True
-
-
-def model_named(keys: Keys, token: str) -> str:
-    """Return the model of a member token whose name is possible; empty for a presence token."""
-    chunks = token.removeprefix(f"{PREFIX}/{keys.cell}/").split("/")
-    return chunks[1] if chunks[0] == "model" else ""
+    return all(is_name(chunk) for chunk in token.removeprefix(f"{PREFIX}/").split("/"))
 
 
 def present(keys: Keys, tokens: Iterable[str]) -> Present:
     """Return the processes that presence or member tokens stand for."""
-    named = {token: member_named(keys, token) for token in tokens}
+    shown = sorted(set(tokens))
+    possible = tuple(token for token in shown if is_token(keys, token))
     return Present(
-        members=tuple(sorted({member for member in named.values() if member is not None})),
-        strangers=tuple(sorted(token for token, member in named.items() if member is None)),
+        members=tuple(sorted({keys.member_of(token) for token in possible})),
+        tokens=possible,
+        strangers=tuple(token for token in shown if token not in possible),
     )

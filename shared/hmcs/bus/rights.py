@@ -111,13 +111,14 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
         announces: tuple[str, ...] = (),
         watches: tuple[str, ...] = (),
     ) -> Rights:
+        # Its health check comes with the certificate of the service it asks.
         return Rights(
             says,
             hears,
             tuple(keys.rpc(name, instance, verb.name) for verb in verbs_of(name)),
-            asks,
+            (keys.rpc(name, ANY, HEALTH.name), *asks),
             (keys.presence(name, instance), *announces),
-            watches,
+            (keys.presence(name), *watches),
         )
 
     last_steps = rpc(("input_device", LAST_STEPS))

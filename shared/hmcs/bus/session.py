@@ -25,11 +25,12 @@ from hmcs.bus.bounds import BOUNDS, LARGEST_PUBLISHED_BYTES
 from hmcs.bus.config import BusSettings
 from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
 from hmcs.bus.counters import Counters
-from hmcs.bus.keys import ANY, PREFIX, Keys, check_name, is_name
+from hmcs.bus.keys import ANY, Keys, check_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.loop import Loop
 from hmcs.bus.mailbox import Arrival, EveryOne, Listening, Mailbox, NewestWins
 from hmcs.bus.messages import Envelope, Message, Origin, Source
+from hmcs.bus.presence import Present, is_token, present
 from hmcs.bus.qos import STANCES, Stance
 from hmcs.bus.questions import (
     Answer,
@@ -352,14 +353,17 @@ class Bus:
     def watch(self, key: str, handler: Callable[[str, bool], None]) -> None:
         """Call `handler` with each token's key as it comes (True) or goes (False).
 
-        Those already there come first. A token that is only confirmed is not told again; one that
-        holds what is no name is refused and counted.
+        Those already there come first. A token that is only confirmed is not told again; one with
+        an impossible name is refused and counted.
         """
         check_right(self.rights, "watches", key)
         living: set[str] = set()
 
         def change(token: str, alive: bool) -> None:
-            if not self._is_token(token) or alive == (token in living):
+            if alive == (token in living):
+                return
+            if not is_token(self.keys, token):
+                self._refuse_token(token)
                 return
             if alive and len(living) >= TOKENS_BOUND:
                 self._seldom.warning("tokens", "too many tokens: one more is left out", token=token)
@@ -378,23 +382,25 @@ class Bus:
     def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
         """Return the keys of the tokens on `key` that are there now, sorted.
 
-        Those that hold what is no name are left out and counted.
+        Those with an impossible name are left out and counted.
         """
+        return list(self.present(key, timeout_s).tokens)
+
+    def present(self, key: str, timeout_s: float = 1.0) -> Present:
+        """Return who shows a token on `key` now; those with an impossible name are counted."""
         check_right(self.rights, "watches", key)
         samples = replies_until_done(
             lambda handler: self._session.liveliness().get(key, handler, timeout=timeout_s),
             self._stopping,
         )
-        tokens = {str(sample.key_expr) for sample in samples[:TOKENS_BOUND]}
-        return sorted(token for token in tokens if self._is_token(token))
+        found = present(self.keys, (str(sample.key_expr) for sample in samples[:TOKENS_BOUND]))
+        for token in found.strangers:
+            self._refuse_token(token)
+        return found
 
-    def _is_token(self, token: str) -> bool:
-        chunks = token.removeprefix(f"{PREFIX}/").split("/")
-        if all(is_name(chunk) for chunk in chunks):
-            return True
+    def _refuse_token(self, token: str) -> None:
         self.counters.count_refused("presence", token)
-        self._seldom.warning("token", "presence under what is no name: refused", token=token)
-        return False
+        self._seldom.warning("token", "presence under an impossible name: refused", token=token)
 
     # --- the loop ---------------------------------------------------------------------------------
 

@@ -7,18 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmcs.bus.keys import Keys, Member
-from hmcs.bus.presence import member_named, model_named, present
+from hmcs.bus.presence import is_token, present
 
 KEYS = Keys("demo")
 IMPOSSIBLE = ["evil name", "\x1b[2Jx", "n" * 300, "", "*", "$x", "-x", "\u202ex", "a?b"]
 
 
 def test_a_token_stands_for_its_process() -> None:
-    assert member_named(KEYS, KEYS.presence("robot", "r")) == Member("robot", "r")
     token = KEYS.member("mine", "recognizer", "r-1")
-    assert member_named(KEYS, token) == Member("recognizer", "r-1")
-    assert model_named(KEYS, token) == "mine"
-    assert model_named(KEYS, KEYS.presence("model", "x")) == ""
+    found = present(KEYS, [token, KEYS.presence("robot", "r")])
+    assert found.members == (Member("recognizer", "r-1"), Member("robot", "r"))
+    assert (KEYS.model_of(token), found.strangers) == ("mine", ())
 
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)
@@ -30,13 +29,14 @@ def test_a_name_that_is_impossible_stands_for_nobody(name) -> None:
         f"hmcs/@v1/demo/model/m/member/{name}/r",
         f"hmcs/@v1/demo/model/{name}/member/recognizer/r",
     ):
-        assert member_named(KEYS, token) is None
+        assert not is_token(KEYS, token)
 
 
 @given(st.text())
-def test_whatever_the_token_somebody_or_nobody_is_returned(text) -> None:
+def test_whatever_the_token_it_is_judged(text) -> None:
     for token in (text, f"hmcs/@v1/demo/{text}", KEYS.presence("robot", "r") + text):
-        member_named(KEYS, token)
+        found = present(KEYS, [token])
+        assert found.strangers == (token,) or found.tokens == (token,)
 
 
 def test_members_come_sorted_and_once_strangers_beside_them() -> None:

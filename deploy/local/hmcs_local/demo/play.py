@@ -14,10 +14,11 @@ from typing import NamedTuple
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import HEALTH
+from hmcs_local.connecting import open_observer
 from hmcs_local.demo.cpu import CpuMeter
 from hmcs_local.demo.progress import PROGRESS, Progress, ProgressLine
 from hmcs_local.demo.truth import RunError
-from hmcs_local.observer import Sighting, look, open_observer
+from hmcs_local.observer import Sighting, look
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import LocalStack
 
