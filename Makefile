@@ -11,7 +11,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench peers test-browser pictures schemas test-containers clean
+.PHONY: help setup demo test lint bench peers test-browser pictures schemas manifests fuzz test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -49,6 +49,12 @@ pictures: $(READY) ## take the pictures of the page that stand in docs/ anew, in
 schemas: $(READY) ## rewrite JSON Schemas, golden bytes and the page of all messages
 	@$(RUN)/python -m hmcs.bus.schemas tests/contract
 	@$(RUN)/python -m hmcs.bus.contract_page docs/contract.md
+
+manifests: $(READY) ## rewrite the Kubernetes manifests from compose.yaml
+	@$(RUN)/python -m hmcs_local.kubernetes compose.yaml deploy/kubernetes/hmcs.yaml
+
+fuzz: $(READY) ## a million hostile messages and ten thousand questions at the stack; about an hour
+	@PYTHONPATH=tests $(RUN)/python -m fuzz
 
 test-containers: $(READY) ## build the images and run the stack in a Docker engine
 	@$(RUN)/python -m pytest -m containers tests/containers

@@ -14,8 +14,8 @@ import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self, SupportsIndex
 
-LONGEST = 500
-"""Characters of a text that are shown."""
+LONGEST, LONGEST_IN_REPORT = 500, 10_000
+"""Characters of a text that are shown, and of one in a report, which may be a paragraph."""
 
 _CUT = "…"
 _MOST_MARKS = 3
@@ -42,7 +42,7 @@ def plain(text: str, longest: int = LONGEST) -> str:
     return shown if len(shown) <= longest else shown[: longest - len(_CUT)] + _CUT
 
 
-def as_html(text: str, longest: int = LONGEST) -> str:
+def as_html(text: str, longest: int = LONGEST_IN_REPORT) -> str:
     """Return a text to stand in HTML, between tags or in a quoted attribute."""
     return html.escape(plain(text, longest))
 

@@ -99,6 +99,7 @@ def start(stack: Stack, task: Path, folder: Path) -> Cell:
     trainer = stack._spawn(
         *("trainer", "trainer", "hmcs_trainer", "serve", "--router", stack.endpoint),
         *("--cell", CELL, "--instance", "trainer", "--folder", str(folder / "models")),
+        *("--sources", str(folder), "--sources", str(task)),
     )
     cell = Cell(
         stack,

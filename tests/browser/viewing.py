@@ -91,15 +91,18 @@ class Cell:
         self,
         stack: Stack,
         *others: tuple[Any, ...],
-        task: str | Path = TASK,
+        task: str | Path | None = TASK,
         console: tuple[Any, ...] = (),
     ) -> None:
-        """Bring up a console with more flags; `others` are services with theirs."""
+        """Bring up a console with more flags; `others` are services with theirs.
+
+        Without a task it learns its states from whoever believes.
+        """
         self.stack = stack
         self.bus = stack.open_bus("observer", "o")
         stack.watch(self.bus)
         self.heard = Heard(self.bus)
-        flags = ("--port", 0, "--task", task, *SLOW, *console)
+        flags = ("--port", 0, *(() if task is None else ("--task", task)), *SLOW, *console)
         started = [stack.start("console", "page", *flags)]
         started += [stack.start(name, name, *its_flags) for name, *its_flags in others]
         stack.until_ready(*started, within_s=START_S)
@@ -122,14 +125,17 @@ class Viewer:
         task: str | Path = TASK,
         size: tuple[int, int] = SIZE,
         coarse: float = COARSE,
+        **context: Any,
     ) -> None:
-        """Begin with an empty page; `open` opens the console's."""
+        """Begin with an empty page in a context of the browser; `open` opens the console's."""
         self.cell = cell
         self._size = size
         self.requests: list[str] = []
         """Whatever it has asked for, addresses of sockets among it."""
         self._context = browser.new_context(
-            viewport={"width": size[0], "height": size[1]}, device_scale_factor=coarse
+            viewport={"width": size[0], "height": size[1]},
+            device_scale_factor=coarse,
+            **context,
         )
         self.page = self._context.new_page()
         self.page.set_default_timeout(PAGE_S * 1e3)

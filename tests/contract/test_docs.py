@@ -12,7 +12,7 @@ import typer.main
 import yaml
 
 from hmcs.bus.contract_page import page
-from hmcs.recordings.labels import HEADER
+from hmcs.recordings.label_files import HEADER
 from hmcs.task import Task
 from hmcs.task.parts import State
 from hmcs_local.command import app

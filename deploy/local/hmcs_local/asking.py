@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from hmcs.bus.keys import ANY, Member
-from hmcs.bus.messages import Ask, Done, Message
-from hmcs.bus.presence import possible, present
+from hmcs.bus.messages import Ask, Done, Message, StopRequest
+from hmcs.bus.presence import Present, possible, present
 from hmcs.bus.session import Answer, Bus, RequestRefusedError
+from hmcs.bus.verbs import STOP, Verb
 from hmcs.errors import UserError
 from hmcs.shown import plain
+
+Q = TypeVar("Q", bound=Message)
 
 _ASKED_AT_ONCE = 256
 """Of more than so many processes some wait until others have answered."""
@@ -56,25 +59,29 @@ class Replies(NamedTuple):
 
 
 def ask_everybody(
-    bus: Bus, service: str, verb: str, question: Message, timeout_s: float = 2.0
+    bus: Bus, verb: Verb[Q, Done], question: Q, service: str = "", timeout_s: float = 2.0
 ) -> Replies:
     """Ask every instance of a service that is present, all at once; return what each made of it.
 
-    Raises NobodyAnswersError where none is present.
+    `service` is needed only for a verb that several kinds of process answer. Raises
+    NobodyAnswersError where none is present.
     """
+    service = service or verb.services[0]
     there = present(bus.keys, bus.alive(bus.keys.presence(service)))
     if not there.members:
         raise _nobody(bus, service, there.strangers)
     return Replies(_asked(bus, there.members, verb, question, timeout_s), there.strangers)
 
 
-def asked_of(bus: Bus, service: str, verb: str, question: Message, timeout_s: float = 2.0) -> str:
+def asked_of(
+    bus: Bus, verb: Verb[Q, Done], question: Q, service: str = "", timeout_s: float = 2.0
+) -> str:
     """Ask every instance of a service; return what they have done.
 
     Raises NobodyAnswersError where none is present, one refuses or none answers, and
     PartlyAnsweredError where some have done it and others do not answer.
     """
-    replies = ask_everybody(bus, service, verb, question, timeout_s).each
+    replies = ask_everybody(bus, verb, question, service, timeout_s).each
     told = "; ".join(map(str, replies))
     if any(reply.refused for reply in replies) or not any(reply.done for reply in replies):
         raise NobodyAnswersError(told)
@@ -86,22 +93,34 @@ def asked_of(bus: Bus, service: str, verb: str, question: Message, timeout_s: fl
 def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
     """Let every robot of the cell stand, whoever drives it; return what each says.
 
-    All are asked at once, before anybody is looked for: no robot waits for another one, or for a
-    token that is there. Those who are present are asked by name as well, again and again until they
+    A message that needs no answer goes to all of them, again and again while they are asked. All
+    are asked at once, before anybody is looked for: no robot waits for another one, or for a token
+    that is there. Those who are present are asked by name as well, again and again until they
     answer, refuse or `timeout_s` is over. Raises NobodyAnswersError where there is no robot.
     """
-    with ThreadPoolExecutor(1) as aside:
-        of_all = aside.submit(_answers, bus, Member("robot", ANY), "stop", Ask(), timeout_s)
-        there = present(bus.keys, bus.alive(bus.keys.presence("robot")))
-        by_name = _asked(bus, there.members, "stop", Ask(), timeout_s, again=True)
+    requests = bus.publisher(StopRequest, bus.keys.stop_request)
+    request = StopRequest(reason=f"hmcs stop, by {bus.source.service} {bus.source.instance}")
+    with ThreadPoolExecutor(2) as aside:
+        of_all = aside.submit(_answers, bus, Member("robot", ANY), STOP, Ask(), timeout_s)
+        of_present = aside.submit(_stop_by_name, bus, timeout_s)
+        while not (of_all.done() and of_present.done()):
+            requests.put(request)
+            time.sleep(_ASK_AGAIN_S)
+    there, by_name = of_present.result()
     replies = {reply.member: reply for reply in by_name}
     for answer in of_all.result() if of_all.exception() is None else ():
         member = _sender(answer)
-        if possible(member) and not (member in replies and replies[member].done):
+        is_robot = member.service == "robot" and possible(member)
+        if is_robot and not (member in replies and replies[member].done):
             replies[member] = Reply(member, True, answer.body.detail)
     if not replies:
         raise _nobody(bus, "robot", there.strangers)
     return Replies(tuple(sorted(replies.values())), there.strangers)
+
+
+def _stop_by_name(bus: Bus, timeout_s: float) -> tuple[Present, tuple[Reply, ...]]:
+    there = present(bus.keys, bus.alive(bus.keys.presence("robot")))
+    return there, _asked(bus, there.members, STOP, Ask(), timeout_s, again=True)
 
 
 def left_out(strangers: Sequence[str]) -> str:
@@ -118,8 +137,8 @@ def left_out(strangers: Sequence[str]) -> str:
 def _asked(
     bus: Bus,
     members: Sequence[Member],
-    verb: str,
-    question: Message,
+    verb: Verb[Q, Done],
+    question: Q,
     timeout_s: float,
     *,
     again: bool = False,
@@ -149,10 +168,11 @@ def _asked(
 
 
 def _answers(
-    bus: Bus, member: Member, verb: str, question: Message, timeout_s: float
+    bus: Bus, member: Member, verb: Verb[Q, Done], question: Q, timeout_s: float
 ) -> list[Answer[Done]]:
-    key = bus.keys.rpc(member.service, member.instance, verb)
-    return bus.ask(key, question, Done, timeout_s)
+    return verb.ask(
+        bus, question, service=member.service, instance=member.instance, timeout_s=timeout_s
+    )
 
 
 def _sender(answer: Answer[Done]) -> Member:

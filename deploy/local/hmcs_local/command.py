@@ -14,12 +14,15 @@ from rich.text import Text
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
+from hmcs.shown import plain
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
 
 if TYPE_CHECKING:
     from hmcs_local.asking import Replies
 
 USER_MISTAKE = 2
+_LONGEST_LINE = 4000
+"""Characters of an error message that are shown, a line."""
 
 app = typer.Typer(
     help="HMCS: recognizes what an operator's hand is about to do, and lends it a ruler.",
@@ -279,6 +282,13 @@ def train(
     report: Annotated[
         bool, typer.Option(help="Write a page beside the model on what it is worth.")
     ] = True,
+    accept_implausible: Annotated[
+        bool,
+        typer.Option(
+            "--accept-implausible",
+            help="Learn even from what no hand seems to have made: jumps, other units.",
+        ),
+    ] = False,
 ) -> None:
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
@@ -302,6 +312,7 @@ def train(
             seed=seed,
             find_states=find_states,
             report=output.with_suffix(".html") if report else None,
+            accept_implausible=accept_implausible,
             progress=typer.echo,
             fits=fits,
         )
@@ -315,11 +326,12 @@ def cancel(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     The exit code is 0 where each one has done it, else 1.
     """
     from hmcs.bus.messages import Ask
+    from hmcs.bus.verbs import CANCEL
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "trainer", "cancel", Ask(), timeout_s=5.0)
+        replies = ask_everybody(bus, CANCEL, Ask(), timeout_s=5.0)
     raise typer.Exit(_told(replies))
 
 
@@ -346,11 +358,12 @@ def record(
     The exit code is 0 where each one has done it, else 1.
     """
     from hmcs.bus.messages import Record
+    from hmcs.bus.verbs import RECORD
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "recorder", "record", Record(on=not stop, name=name))
+        replies = ask_everybody(bus, RECORD, Record(on=not stop, name=name))
     raise typer.Exit(_told(replies))
 
 
@@ -392,11 +405,12 @@ def play(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo") -> None:
     The exit code is 0 where every input device has done it, else 1.
     """
     from hmcs.bus.messages import Ask
+    from hmcs.bus.verbs import PLAY
     from hmcs_local.asking import ask_everybody
     from hmcs_local.observer import open_observer
 
     with open_observer(router, cell) as bus:
-        replies = ask_everybody(bus, "input_device", "play", Ask())
+        replies = ask_everybody(bus, PLAY, Ask())
     raise typer.Exit(_told(replies))
 
 
@@ -609,20 +623,20 @@ def check(
         typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER: whether they fit it and agree."),
     ] = None,
 ) -> None:
-    """Name every problem of a task file, with line and field; exit code 2 where there is one."""
+    """Name every problem of a task file, with line and field; exit code 2 where there is one.
+
+    Demonstrations are judged as by `hmcs train`: what it would refuse ends with exit code 2.
+    """
     from hmcs.fixtures.workspace import check_workspace
-    from hmcs.recognition.disagreement import check_agreement
-    from hmcs.recognition.segments import segments_of
     from hmcs.task import load_task
-    from hmcs_trainer.references import read_references
+    from hmcs_trainer.training import checked
 
     task = load_task(file)
     check_workspace(file, task)
     shown = ""
     if demonstrations:
-        read = read_references(demonstrations, task)
-        check_agreement(task, segments_of(task, read))
-        shown = f"; {len(read)} demonstrations agree"
+        count, told = checked(task, demonstrations, typer.echo)
+        shown = f"; {count} demonstrations agree" + (", but for what is told above" if told else "")
     counts = f"{len(task.gestemes)} gestemes, {len(task.states)} states"
     typer.echo(f"{file}: in order: {counts}{shown}")
 
@@ -652,7 +666,9 @@ def main() -> None:
     try:
         app()
     except UserError as error:
-        sys.stderr.write(f"hmcs: {error}\n")
+        # It may quote what a process or a file says.
+        lines = (plain(line, _LONGEST_LINE) for line in str(error).split("\n"))
+        sys.stderr.write("hmcs: " + "\n".join(lines) + "\n")
         sys.exit(USER_MISTAKE)
 
 

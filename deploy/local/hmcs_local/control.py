@@ -193,11 +193,14 @@ def _line_from(connection: socket.socket, timeout_s: float) -> bytes:
     deadline_s = time.monotonic() + timeout_s
     data = b""
     while not data.endswith(b"\n"):
-        connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
-        more = connection.recv(LONGEST_BYTES + 1 - len(data))
-        data += more
-        if not more or len(data) > LONGEST_BYTES or time.monotonic() > deadline_s:
+        left_s = deadline_s - time.monotonic()
+        if left_s <= 0:
             return b""
+        connection.settimeout(left_s)
+        more = connection.recv(LONGEST_BYTES - len(data))
+        if not more:
+            return b""
+        data += more
     return data
 
 

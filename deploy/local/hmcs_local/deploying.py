@@ -16,10 +16,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from hmcs.bus.keys import ANY, Member
-from hmcs.bus.messages import Ask, Belief, Description
+from hmcs.bus.keys import Member, recognizer_in
+from hmcs.bus.messages import Ask, Belief
+from hmcs.bus.presence import possible
 from hmcs.bus.session import Bus, Received, RequestRefusedError
-from hmcs.errors import UserError
+from hmcs.bus.verbs import DESCRIBE
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.shown import plain
@@ -110,26 +111,31 @@ def active_model(bus: Bus) -> str:
 
     Raises DeployError where there is no fixture controller, or several follow different ones.
     """
-    key = bus.keys.rpc("fixture_controller", ANY, "describe")
-    answers = bus.ask(key, Ask(), Description)
-    if not answers:
+    followed = _followed(bus)
+    if not followed:
         raise DeployError(
             f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
         )
-    followed = {
-        answer.envelope.source.instance: answer.body.facts.get("active_model", "")
-        for answer in answers
-    }
     if len(set(followed.values())) > 1:
         told = ", ".join(
-            f"{plain(instance)} {plain(model) or 'none'}"
-            for instance, model in sorted(followed.items())
+            f"{fixture} {plain(model) or 'none'}" for fixture, model in sorted(followed.items())
         )
         raise DeployError(
             f"fixture controllers follow different models ({told}): let all follow one first, by "
             "`hmcs swap --activate MODEL`"
         )
-    return answers[0].body.facts.get("active_model", "")
+    return next(iter(followed.values()))
+
+
+def _followed(bus: Bus) -> dict[str, str]:
+    """Return the model that each fixture controller follows, empty for none, by instance."""
+    answers = DESCRIBE.ask(bus, Ask(), service="fixture_controller")
+    return {
+        source.instance: answer.body.facts.get("active_model", "")
+        for answer in answers
+        if (source := answer.envelope.source).service == "fixture_controller"
+        and possible(Member(source.service, source.instance))
+    }
 
 
 def watched(bus: Bus, active: str, newcomer: str, watch_s: float) -> Agreement:
@@ -138,7 +144,7 @@ def watched(bus: Bus, active: str, newcomer: str, watch_s: float) -> Agreement:
 
     def hear(received: Received[Belief]) -> None:
         belief = received.body
-        name = received.key.split("/")[-2]
+        name = recognizer_in(received.key).model
         if name in said:
             said[name][belief.clock, belief.step] = belief.likely_state
 
@@ -214,8 +220,8 @@ def _shadow(
 
     def is_followed() -> bool:
         try:
-            return active_model(bus) == model.name
-        except (UserError, RequestRefusedError):
+            return model.name in _followed(bus).values()
+        except Exception:  # who cannot be asked follows nobody
             return False
 
     command = [sys.executable, "-m", f"hmcs_{SERVICE}", "--model", path]
@@ -249,9 +255,8 @@ def _runner(bus: Bus, model: Model) -> Member | None:
     Raises DeployError where another model of the same name is run: two would speak as one.
     """
     for member in speakers(bus).get(model.name, ()):
-        key = bus.keys.rpc(member.service, member.instance, "describe")
         try:
-            answers = bus.ask(key, Ask(), Description)
+            answers = DESCRIBE.ask(bus, Ask(), service=member.service, instance=member.instance)
         except RequestRefusedError:
             continue
         for answer in answers:

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hmcs.shown import plain
 from hmcs_input_device.devices.detect import found
 
 _STYLES = {"ready": "green", "no device": "yellow", "not installed": "dim"}
@@ -16,7 +17,8 @@ def show_devices(console: Console) -> bool:
 
     Returns whether one is ready.
     """
-    sightings = found()
+    # Devices name themselves.
+    sightings = [sighting._replace(detail=plain(sighting.detail)) for sighting in found()]
     if console.is_terminal:
         # Names of extras stand in brackets, which rich would take for styles.
         table = Table("device", "state", "what is there", "what to do", box=None, pad_edge=False)

@@ -95,7 +95,7 @@ def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingConten
 def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console) -> None:
     title = f"{plain(content.path.name)}: {content.duration_s:.1f} s"
     if not labels:
-        console.print(f"{title}, no labels: set one by --set BEGIN-END=STATE", markup=False)
+        console.print(Text(f"{title}, no labels: set one by --set BEGIN-END=STATE"))
         return
     table = Table(title=Text(title), title_justify="left")
     table.add_column("from, s", justify="right")

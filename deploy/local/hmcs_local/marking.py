@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from hmcs.bus.keys import ANY
-from hmcs.bus.messages import Label, LastSteps, LastStepsQuestion
+from hmcs.bus.messages import Label, LastStepsQuestion
 from hmcs.bus.session import Bus
+from hmcs.bus.verbs import LAST_STEPS
 from hmcs.shown import plain
 from hmcs_local.asking import NobodyAnswersError
 
@@ -21,8 +21,7 @@ def mark(bus: Bus, state: str) -> str:
     cannot be known. Raises NobodyAnswersError where nobody listens.
     """
     labels = bus.publisher(Label, bus.keys.label)
-    key = bus.keys.rpc("input_device", ANY, "last_steps")
-    answers = bus.ask(key, LastStepsQuestion(count=1), LastSteps)
+    answers = LAST_STEPS.ask(bus, LastStepsQuestion(count=1))
     next_steps = {a.body.clock: a.body.steps[-1].index + 1 for a in answers if a.body.steps}
     if len(next_steps) > 1:
         label = Label(state=state)

@@ -10,9 +10,10 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from hmcs.bus.keys import ANY, KeyNameError, Keys, Member
-from hmcs.bus.messages import Ask, Description, Envelope, Health
+from hmcs.bus.messages import Ask, Envelope, Health
 from hmcs.bus.presence import member_named, model_named, possible, present
 from hmcs.bus.session import Bus, BusSettings
+from hmcs.bus.verbs import DESCRIBE, HEALTH
 from hmcs.errors import UserError
 
 _CONNECT_TIMEOUT_S = 3.0
@@ -69,12 +70,12 @@ def observe(bus: Bus) -> Observation:
     at_work = bus.alive(keys.member(ANY))
     healths = {
         sender: answer.body
-        for answer in bus.ask(keys.rpc(ANY, ANY, "health"), Ask(), Health, _ANSWER_TIMEOUT_S)
+        for answer in HEALTH.ask(bus, Ask(), timeout_s=_ANSWER_TIMEOUT_S)
         if (sender := _sender(answer.envelope)) is not None
     }
     facts = {
         sender: answer.body.facts
-        for answer in bus.ask(keys.rpc(ANY, ANY, "describe"), Ask(), Description, _ANSWER_TIMEOUT_S)
+        for answer in DESCRIBE.ask(bus, Ask(), timeout_s=_ANSWER_TIMEOUT_S)
         if (sender := _sender(answer.envelope)) is not None
     }
     silent = set(there.members) - {member for member, _ in healths}

@@ -14,7 +14,7 @@ from hmcs.errors import UserError
 from hmcs.recordings.exporting import Format, export
 from hmcs.recordings.inspection import Inspection, inspected
 from hmcs.recordings.labels import label_notes, labels_of
-from hmcs.recordings.plain import BY_SCHEMA
+from hmcs.recordings.plain import readable_as
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.shown import plain
 
@@ -90,5 +90,5 @@ def _told(
 
 def _labels(content: RecordingContent) -> list[str]:
     """The labeled states in order; none where another version of the contract keeps them unread."""
-    readable = content.schemas.keys() <= BY_SCHEMA.keys()
+    readable = all(readable_as(schema) is not None for schema in content.schemas)
     return [label.state for label in labels_of(content)] if readable else []

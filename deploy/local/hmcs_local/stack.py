@@ -161,7 +161,7 @@ class LocalStack:
         """Start one more instance, under the next free name `SERVICE-N`; returns its process.
 
         `command` stands in for the one of compose.yaml, `environment` adds to the one there.
-        Raises StackError for the router, and where the command is not there.
+        Raises StackError for the router, and where the command is not there or cannot be started.
         """
         spec = self.spec.service(service)
         if spec.name == ROUTER:
@@ -235,15 +235,17 @@ class LocalStack:
             raise StackError(
                 f"{instance}: no program {command[0]!r} here: install it or name another"
             )
-        words = (self._local(spec, word) for word in command[1:])
-        process = StackProcess(
-            spec.name,
-            instance,
-            (program, *words),
-            self._local_environment(spec, instance, environment),
-            self.folder / "logs" / f"{instance}.log",
-            spec.stop_grace_s,
-        )
+        try:
+            process = StackProcess(
+                spec.name,
+                instance,
+                (program, *(self._local(spec, word) for word in command[1:])),
+                self._local_environment(spec, instance, environment),
+                self.folder / "logs" / f"{instance}.log",
+                spec.stop_grace_s,
+            )
+        except OSError as error:
+            raise StackError(f"{instance}: cannot be started in {self.folder}: {error}") from error
         self.processes[instance] = process
         self._asked[instance] = (command, dict(environment))
         return process

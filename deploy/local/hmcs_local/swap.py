@@ -5,16 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
-from hmcs.bus.messages import ActivateRecognizer, LoadModel, Message
+from hmcs.bus.messages import ActivateRecognizer, Done, LoadModel, Message
 from hmcs.bus.presence import present
 from hmcs.bus.session import Bus
+from hmcs.bus.verbs import ACTIVATE, LOAD_MODEL, Verb
 from hmcs.errors import UserError
 from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of
 from hmcs_local.control import Control, ControlError
 from hmcs_local.interrupts import uninterrupted
 from hmcs_local.observer import CLASSIFIER, speakers
+
+Q = TypeVar("Q", bound=Message)
 
 _LOOK_EVERY_S = 0.05
 
@@ -43,7 +47,7 @@ def activate(bus: Bus, model: str) -> str:
             f"nobody runs a recognizer of {model!r} in cell {bus.settings.cell}, so it would "
             f"assist nobody: start it first. Those that are run: {', '.join(running) or 'none'}"
         )
-    return _asked_of_fixtures(bus, "activate", ActivateRecognizer(model=model))
+    return _asked_of_fixtures(bus, ACTIVATE, ActivateRecognizer(model=model))
 
 
 def load(bus: Bus, path: str) -> str:
@@ -51,12 +55,12 @@ def load(bus: Bus, path: str) -> str:
 
     The path is the fixture controller's own. Raises SwapError as `activate` does.
     """
-    return _asked_of_fixtures(bus, "load_model", LoadModel(path=path))
+    return _asked_of_fixtures(bus, LOAD_MODEL, LoadModel(path=path))
 
 
-def _asked_of_fixtures(bus: Bus, verb: str, question: Message) -> str:
+def _asked_of_fixtures(bus: Bus, verb: Verb[Q, Done], question: Q) -> str:
     try:
-        return asked_of(bus, "fixture_controller", verb, question)
+        return asked_of(bus, verb, question, "fixture_controller")
     except PartlyAnsweredError as error:
         raise PartlySwappedError(str(error)) from None
     except NobodyAnswersError as error:

@@ -12,7 +12,7 @@ import pytest
 import zenoh
 
 from hmcs.bus.config import BusSettings
-from hmcs.bus.keys import ANY
+from hmcs.bus.keys import ANY, Member
 from hmcs.bus.messages import (
     Ask,
     Done,
@@ -28,6 +28,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.verbs import STOP
 from hmcs.bus.wire import encode
 from hmcs_local import asking
 from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of, stop_everybody
@@ -299,22 +300,31 @@ def test_a_robot_that_cannot_be_reached_yet_is_asked_again(
     assert result[0].all_done
 
 
+@pytest.mark.parametrize(
+    ("service", "instance"), [("robot", "other"), ("attacker", "a"), ("attacker", "x")]
+)
 def test_one_that_answers_in_a_robots_place_is_not_that_robot(
-    router: str, observer: Bus, robot: Callable[..., Asked], seen: Callable[[int], None]
+    router: str,
+    observer: Bus,
+    robot: Callable[..., Asked],
+    seen: Callable[[int], None],
+    service: str,
+    instance: str,
 ) -> None:
     robot("a", hangs=True)
     key = observer.keys.rpc("robot", "a", "stop")
 
     def pretend(query: zenoh.Query) -> None:
-        source = Source(service="robot", instance="other", boot="b")
+        source = Source(service=service, instance=instance, boot="b")
         with query:
             query.reply(key, encode(Done(detail="stands"), Envelope(source=source, seq=0)))
 
     with open_observer(router, CELL) as stranger:
         stranger._declared.append(stranger._session.declare_queryable(key, pretend))
         seen(1)
-        replies = {str(r.member.instance): r.done for r in stop_everybody(observer, 0.5).each}
-    assert replies["a"] is False
+        replies = {r.member: r.done for r in stop_everybody(observer, 0.5).each}
+    assert replies.pop(Member("robot", "a")) is False
+    assert all(member.service == "robot" for member in replies)
 
 
 def test_trouble_with_one_robot_is_told_as_its_own(
@@ -328,10 +338,10 @@ def test_trouble_with_one_robot_is_told_as_its_own(
     seen(2)
     ask = observer.ask
 
-    def fail(key: str, *rest: Any) -> Any:
+    def fail(key: str, *rest: Any, **named: Any) -> Any:
         if "/b/" not in key:
             raise zenoh.ZError("no memory")
-        return ask(key, *rest)
+        return ask(key, *rest, **named)
 
     monkeypatch.setattr(observer, "ask", fail)
     replies = stop_everybody(observer, 0.5)
@@ -345,18 +355,18 @@ def test_what_all_of_a_service_did_is_one_line_and_what_some_did_is_an_error(
     observer: Bus, robot: Callable[..., Asked], seen: Callable[[int], None]
 ) -> None:
     with pytest.raises(NobodyAnswersError, match="no robot in cell asked"):
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     robot("b")
     seen(1)
-    assert asked_of(observer, "robot", "stop", Ask()) == "stop is done"
+    assert asked_of(observer, STOP, Ask()) == "stop is done"
     announce(observer, "robot", "a")
     seen(2)
     with pytest.raises(PartlyAnsweredError, match=r"a: did not answer.*; b: stop is done"):
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     robot("c", refusal="not now")
     seen(3)
     with pytest.raises(NobodyAnswersError, match="c: refused: not now") as refused:
-        asked_of(observer, "robot", "stop", Ask())
+        asked_of(observer, STOP, Ask())
     assert not isinstance(refused.value, PartlyAnsweredError)
 
 

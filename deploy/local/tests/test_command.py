@@ -132,6 +132,16 @@ def test_a_second_up_in_one_folder_is_refused(
     assert "another `hmcs up` works in" in mistake(hmcs("up", "--router", "tcp/127.0.0.1:0"))
 
 
+def test_up_in_a_folder_that_is_none_is_refused(
+    hmcs: Run, write_compose: Callable[..., Path], service: Describe, tmp_path: Path
+) -> None:
+    write_compose(a=service())
+    (tmp_path / "file").touch()
+    done = hmcs("up", "--router", "tcp/127.0.0.1:0", "--folder", "file/up")
+    assert "a-1: cannot be started in" in mistake(done)
+    assert "Not a directory" in done.stderr
+
+
 def test_up_on_a_taken_port_is_refused(
     hmcs: Run, write_compose: Callable[..., Path], service: Describe
 ) -> None:

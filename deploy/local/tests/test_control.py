@@ -83,6 +83,16 @@ def test_a_folder_open_to_others_is_refused(stack: LocalStack) -> None:
         ControlServer(stack).__enter__()
 
 
+def test_a_folder_of_another_user_is_refused(
+    stack: LocalStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: here + 1)
+    control_path(stack.folder).parent.mkdir(mode=0o700)
+    with pytest.raises(ControlError, match="can be used by others"):
+        ControlServer(stack).__enter__()
+
+
 def test_a_link_in_the_place_of_the_folder_is_refused(stack: LocalStack, tmp_path: Path) -> None:
     (tmp_path / "private").mkdir(mode=0o700)
     control_path(stack.folder).parent.symlink_to(tmp_path / "private")

@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zenoh
 
 from hmcs.bus.keys import ANY, Keys
-from hmcs.bus.messages import Ask, Description
+from hmcs.bus.messages import Ask, Description, Envelope, Source
 from hmcs.bus.session import Bus
+from hmcs.bus.wire import encode
 from hmcs.recognition.model_file import load_model, save_model
 from hmcs.task import Task
 from hmcs_local import deploying, swap
@@ -42,6 +44,8 @@ Describe = Callable[..., dict[str, Any]]
 Eventually = Callable[[Callable[[], Any]], Any]
 Served = Callable[[LocalStack, Callable[[], Any]], Any]
 CELL = "deployed"
+UP_WITHIN_S = 240.0
+"""A real recognizer is up by then, however busy the machine is."""
 TASK = {
     "format": "hmcs-task/1",
     "name": "t",
@@ -98,7 +102,7 @@ def bus(stack: LocalStack) -> Iterator[Bus]:
 @pytest.fixture
 def cell(stack: LocalStack, bus: Bus, served: Served, monkeypatch: pytest.MonkeyPatch) -> Cell:
     monkeypatch.setattr(deploying, "watched", lambda *_: Agreement(0, 0))
-    monkeypatch.setattr(deploying, "READY_WITHIN_S", 120.0)
+    monkeypatch.setattr(deploying, "READY_WITHIN_S", UP_WITHIN_S)
     return Cell(stack, bus, served)
 
 
@@ -225,6 +229,37 @@ def test_a_newcomer_that_is_followed_goes_on_whatever_fails_then(
     assert (cell.running, cell.deployed) == (["recognizer-2"], ["mine", "yours"])
 
 
+def test_a_newcomer_that_one_of_two_fixtures_follows_goes_on_beside_the_old_one(
+    cell: Cell, files: dict[str, Path], fixture_controller: Callable[..., Any]
+) -> None:
+    willing = fixture_controller(cell.bus, active="mine", instance="f")
+    other = fixture_controller(cell.bus, active="mine", instance="g")
+    other.refuses = True
+    with pytest.raises(SwapError, match="f: follows yours; g: refused: not now"):
+        cell.deploy(files["yours"])
+    assert (willing.active, other.active) == ("yours", "mine")
+    assert cell.running == ["recognizer-1"]
+
+
+def test_what_a_stranger_says_that_it_follows_is_not_what_fixtures_follow(
+    bus: Bus, stack: LocalStack, fixture_controller: Callable[..., Any]
+) -> None:
+    fixture_controller(bus, active="mine")
+    key = bus.keys.rpc("fixture_controller", "x", "describe")
+    said = Description(
+        version="1", publishes=(), subscribes=(), answers=(), facts={"active_model": "other"}
+    )
+    stranger = Source(service="attacker", instance="x", boot="b")
+
+    def pretend(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, encode(said, Envelope(source=stranger, seq=0)))
+
+    with open_observer(stack.router, CELL) as other:
+        other._declared.append(other._session.declare_queryable(key, pretend))
+        assert active_model(bus) == "mine"
+
+
 def test_what_a_killed_deploy_has_left_is_stopped_by_the_next_one(
     cell: Cell, files: dict[str, Path], fixture_controller: Callable[..., Any]
 ) -> None:
@@ -262,7 +297,7 @@ def test_one_that_runs_that_very_model_already_is_taken_and_left_as_it_is(
     command = [sys.executable, "-m", "hmcs_recognizer", "--model", str(files["mine"])]
     there = cell.stack.start("recognizer", command=command).instance
     member = cell.bus.keys.member("mine", ANY, there)
-    eventually(lambda: cell.bus.alive(member) and described(cell.bus, there))
+    eventually(lambda: cell.bus.alive(member) and described(cell.bus, there), UP_WITHIN_S)
     with suppress(SwapError):
         cell.deploy(files["mine"])
     assert cell.running == [there]
@@ -285,7 +320,10 @@ def test_another_model_of_the_name_that_is_run_is_a_reason_not_to_begin(
     fixture = fixture_controller(cell.bus, active="human-shapes")
     command = [sys.executable, "-m", "hmcs_recognizer", "--model", str(files["2"])]
     there = cell.stack.start("recognizer", command=command).instance
-    eventually(lambda: cell.bus.alive(cell.bus.keys.member("mine")) and described(cell.bus, there))
+    eventually(
+        lambda: cell.bus.alive(cell.bus.keys.member("mine")) and described(cell.bus, there),
+        UP_WITHIN_S,
+    )
     with pytest.raises(DeployError, match=f"{there} runs another model of the name 'mine'"):
         cell.deploy(files["mine"])
     assert (cell.running, fixture.asked) == ([there], [])
@@ -379,9 +417,9 @@ def test_a_deploy_that_is_interrupted_from_outside_leaves_no_shadow(
             stderr=subprocess.DEVNULL,
         )
         try:
-            eventually(lambda: bus.alive(Keys(CELL).member(name)), 60)
+            eventually(lambda: bus.alive(Keys(CELL).member(name)), UP_WITHIN_S)
             process.send_signal(number)
-            assert process.wait(60) != 0
+            assert process.wait(UP_WITHIN_S) != 0
         finally:
             process.kill()
             process.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -114,3 +115,56 @@ def test_labels_there_are_already_are_held_to_the_task(hmcs: Run, take: Path) ->
     code, _, error = hmcs("label", take, "--task", "lines-through-obstacles")
     assert code == 2
     assert "'fly' from 0.100 s to 0.200 s" in error
+
+
+@pytest.mark.parametrize("name", ["[red]", "[/x]", "a\x1b[2Jb", "\u202egnp"])
+def test_names_in_a_recording_are_text_and_nothing_a_terminal_obeys(
+    hmcs: Run, tmp_path: Path, name: str
+) -> None:
+    take = Maker(tmp_path / "takes").write(list(hand_of((name, "carry"), 100)))
+    shown = name.encode("unicode_escape").decode()
+    for word in ("label", "inspect"):
+        _, out, err = hmcs(word, take)
+        assert not err
+        assert out.replace("\n", "").isprintable()
+        assert shown in out
+    _, out, _ = hmcs("inspect", take, "--json")
+    assert out.removesuffix("\n").isprintable()
+    assert json.loads(out)["labels"] == [name, "carry"]
+
+
+def test_an_error_that_quotes_a_file_is_text(hmcs: Run, tmp_path: Path) -> None:
+    code, _, err = hmcs("inspect", tmp_path / "\x1b[2Jnone.mcap")
+    assert code == 2
+    assert "\\x1b[2Jnone.mcap" in err
+    assert err.replace("\n", "").isprintable()
+
+
+def test_labels_of_another_recording_are_told_and_kept_aside(hmcs: Run, take: Path) -> None:
+    assert hmcs("label", take, "--set", "0-1=old")[0] == 0
+    take.unlink()
+    Maker(take.parent).write(list(hand_of(("carry", "lift"), 100)))
+    code, out, _ = hmcs("label", take)
+    assert code == 0
+    assert "note: the labels in take.labels.csv are of another recording" in out
+    assert [row[2].strip() for row in rows(out)] == ["carry", "lift"]
+    assert "take.labels.csv are of another recording" in hmcs("inspect", take)[1]
+    code, out, _ = hmcs("label", take, "--set", "0-1=lift")
+    assert code == 0
+    assert "the labels of another recording are in" in out
+    assert "old" in (take.parent / "take.labels-of-another-1.csv").read_text()
+    assert states(take)[0] == "lift"
+
+
+def test_labels_in_milliseconds_are_told_as_such(hmcs: Run, take: Path) -> None:
+    labels_beside(take).write_text("begin_s,end_s,state\n0,1000,lift\n1000,2000,carry\n")
+    code, _, error = hmcs("label", take)
+    assert code == 2
+    assert "read like milliseconds: divide them by 1000" in error
+
+
+def test_a_label_beyond_the_end_is_told(hmcs: Run, take: Path) -> None:
+    labels_beside(take).write_text("begin_s,end_s,state\n0,2.9,lift\n")
+    code, out, _ = hmcs("label", take)
+    assert code == 0
+    assert "note: take.labels.csv:2: label 'lift' from 0.000 s to 2.900 s ends after" in out

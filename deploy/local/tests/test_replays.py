@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import FixtureState, Label, Motion, Step
+from hmcs.bus.messages import Belief, FixtureState, Label, Motion, Step
 from hmcs.bus.wire import encode
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
@@ -24,6 +25,7 @@ from hmcs_local.replays import OPEN_LOOP
 from support.cells import KEYS, Logged, performance, write_cell
 from support.lessons import ROUND, lesson_task
 from support.lessons import performed as lesson
+from support.mcap_files import chunks_of, with_bytes
 from support.recordings import ROOMY
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -253,3 +255,75 @@ def test_a_recording_cut_at_any_byte_is_told_and_leaves_nothing_half_written(
         for name in written:
             (tmp_path / name).unlink()
     assert codes == {0, 2}
+
+
+# --- recordings of others, damaged ones -----------------------------------------------------------
+
+EVIL = "[/bold]\x1b[31m\u202e[link=file:///x]"
+
+
+def test_words_of_a_recording_are_shown_and_never_obeyed(
+    hmcs: Run, said: list[Logged], tmp_path: Path
+) -> None:
+    preface = Preface(
+        {f"robot/{EVIL}": {EVIL: EVIL}, "hmcs": {"version": EVIL}}, {f"../{EVIL}.hmcs": b"x"}
+    )
+    recording = Recording(tmp_path, "take", ROOMY, lambda: preface, said[0].log_ns, "test")
+    for each in said[:300]:
+        key = f"hmcs/@v1/x/{EVIL}" if each.is_of(Motion) else each.key
+        fields = fields_of(encode(each.body, each.envelope))
+        recording.write(key, fields, each.log_ns, None)
+    label = next(each for each in said if each.is_of(Step))._replace(body=Label(state=EVIL))
+    fields = fields_of(encode(label.body, label.envelope))
+    recording.write(KEYS.label, fields, said[300].log_ns, None)
+    recording.write(KEYS.label, fields, said[300].log_ns + 10**7, None)
+    recording.finish()
+    path = str(recording.path)
+    for words in (
+        ["inspect", path],
+        ["label", path],
+        ["replay", path],
+        ["inspect", path, "--json"],
+    ):
+        ended = hmcs(*words)
+        assert ended.returncode in (0, 1, 2), words
+        shown = ended.stdout + ended.stderr
+        assert "Traceback" not in shown
+        assert "\x1b" not in shown
+        assert "\u202e" not in shown
+    assert "[/bold]" in hmcs("inspect", path).stdout
+    assert hmcs("export", path, "--to", "tables").returncode == 0
+    assert all("\x1b" not in file.name for file in (tmp_path / "tables").iterdir())
+
+
+def test_damage_in_the_middle_is_told_with_its_times_and_the_rest_is_used(
+    hmcs: Run, take: Path, tmp_path: Path
+) -> None:
+    begin, end = chunks_of(take)[1]
+    bad = with_bytes(take, tmp_path / "bad.mcap", (begin + end) // 2, b"\0" * 8, 8)
+    inspected = hmcs("inspect", str(bad))
+    assert inspected.returncode == 1
+    assert re.search(r"missing: between \d+\.\d+ s and \d+\.\d+ s something is", inspected.stdout)
+    assert "last moments" not in inspected.stdout
+    assert hmcs("replay", str(bad)).returncode == 0
+
+
+def test_steps_believed_without_all_evidence_are_counted_apart(
+    hmcs: Run, said: list[Logged], models: dict[str, Path], tmp_path: Path
+) -> None:
+    steps = 0
+    made = []
+    for each in said:
+        if each.is_of(Belief):
+            steps += 1
+            if steps % 3 == 0:
+                body = each.body.model_copy(update={"missing_gestemes": ("lift",)})
+                each = each._replace(body=body)
+        made.append(each)
+    take = write_cell(tmp_path / "takes", made)
+    ended = hmcs("replay", str(take), "--model", str(models["lesson"]))
+    assert ended.returncode == 0
+    lost = steps // 3
+    assert f"{steps} steps, {lost} of them believed without all evidence live" in ended.stdout
+    told = json.loads(hmcs("replay", str(take), "--model", str(models["lesson"]), "--json").stdout)
+    assert (told["degraded"], told["compared"]) == (lost, steps - lost)

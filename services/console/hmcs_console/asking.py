@@ -10,8 +10,10 @@ from typing import TypeVar
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Done, Message
 from hmcs.bus.session import Answer, Bus, RequestRefusedError, StoppedError
+from hmcs.bus.verbs import Verb
 
-M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+A = TypeVar("A", bound=Message)
 
 _AT_ONCE = 2
 WAITING = 8
@@ -38,14 +40,14 @@ class Asking:
 
     def ask(
         self,
-        key: str,
-        question: Message,
-        answer_type: type[M],
-        then: Callable[[list[Answer[M]]], None],
+        verb: Verb[Q, A],
+        member: Member,
+        question: Q,
+        then: Callable[[list[Answer[A]]], None],
         refused: Callable[[str], None] = lambda _: None,
         timeout_s: float = 1.0,
     ) -> None:
-        """Ask whoever answers on `key`; hand the answers, or the refusal, on with `take`."""
+        """Ask a process, or all that `member` matches; hand what comes of it on with `take`."""
         most = self._most_waiting + _MOST_ASKED
         if self._asked == most:
             refused(f"{most} questions wait for an answer: wait for one before the next")
@@ -54,7 +56,13 @@ class Asking:
 
         def work() -> None:
             try:
-                answers = self._bus.ask(key, question, answer_type, timeout_s)
+                answers = verb.ask(
+                    self._bus,
+                    question,
+                    service=member.service,
+                    instance=member.instance,
+                    timeout_s=timeout_s,
+                )
             except StoppedError:
                 return
             except RequestRefusedError as error:
@@ -72,8 +80,8 @@ class Asking:
     def request(
         self,
         member: Member,
-        verb: str,
-        question: Message,
+        verb: Verb[Q, Done],
+        question: Q,
         done: Callable[[str], None],
         failed: Callable[[str], None] | None = None,
         timeout_s: float = 5.0,
@@ -94,14 +102,13 @@ class Asking:
             if answers:
                 done(answers[0].body.detail)
             else:
-                failed(f"{member.service} gave no answer to {verb}")
+                failed(f"{member.service} gave no answer to {verb.name}")
 
         def refused(reason: str) -> None:
             self._waiting -= 1
             failed(f"{member.service} refused: {reason}")
 
-        key = self._bus.keys.rpc(member.service, member.instance, verb)
-        self.ask(key, question, Done, come, refused, timeout_s)
+        self.ask(verb, member, question, come, refused, timeout_s)
 
     def take(self) -> None:
         """Hand on what has come."""

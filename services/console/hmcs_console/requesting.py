@@ -56,6 +56,6 @@ class Requesting:
     def _ask(self, question: Question, done: Told, failed: Told) -> None:
         member = first_of(question.service, self._seen.members)
         if member is None:
-            failed(f"no {question.service} is there to {question.verb}: start one")
+            failed(f"no {question.service} is there to {question.verb.name}: start one")
         else:
             self._asking.request(member, question.verb, question.body, done, failed)

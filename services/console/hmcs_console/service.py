@@ -22,6 +22,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
+from hmcs.bus.verbs import HEALTH, LOOKS
 from hmcs.fixtures.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
@@ -33,9 +34,10 @@ from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.models import Models, load_models, task_of
-from hmcs_console.seeing.presence import MOST_TOKENS, Presence
+from hmcs_console.seeing.presence import Presence
 from hmcs_console.seeing.seen import Picture, Seen
-from hmcs_console.serving.gateway import Gateway, Served, encryption
+from hmcs_console.serving.encryption import encryption
+from hmcs_console.serving.gateway import Gateway, Served
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
@@ -51,6 +53,7 @@ TAKE_EVERY_S = 0.01
 HANDLE_HZ = 30.0
 """How often a held handle is told, however seldom the page is drawn: one that is silent for longer
 than a few of these counts as let go."""
+_EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
 WATCH_EVERY_S = 0.1
 """How often is looked at how a newcomer among the recognizers does."""
@@ -90,9 +93,7 @@ class Console(Service):
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
         try:
-            self._gateway = Gateway(
-                served(settings), self.page.server.get_port(), log, self._count_refused
-            )
+            self._gateway = Gateway(served(settings), self.page.server, log, self._count_refused)
         except BaseException:
             self.page.close()
             self._asking.close()
@@ -208,10 +209,8 @@ class Console(Service):
         self._stopping.take()
 
     def _stop_everybody(self) -> None:
-        members = self._seen.members
-        robots = [member for member in members if member.service == "robot"]
-        crowded = len(members) >= MOST_TOKENS
-        self._stopping.stop_everybody(robots, self._tell, crowded=crowded)
+        robots = [member for member in self._seen.members if member.service == "robot"]
+        self._stopping.stop_everybody(robots, self._tell)
 
     def _show(self) -> None:
         now_s = time.monotonic()
@@ -255,8 +254,7 @@ class Console(Service):
 
     def _on_process(self, member: Member) -> None:
         if member.service == "robot":
-            looks = self.bus.keys.rpc(member.service, member.instance, "looks")
-            self._asking.ask(looks, Ask(), RobotLooks, self._on_looks, timeout_s=5.0)
+            self._asking.ask(LOOKS, member, Ask(), self._on_looks, timeout_s=5.0)
 
     def _on_looks(self, answers: list[Answer[RobotLooks]]) -> None:
         for answer in answers[:1]:
@@ -264,8 +262,7 @@ class Console(Service):
 
     def _ask_health(self) -> None:
         if self.page.viewers:
-            key = self.bus.keys.rpc(ANY, ANY, "health")
-            self._asking.ask(key, Ask(), Health, self._on_health, timeout_s=0.5)
+            self._asking.ask(HEALTH, _EVERYBODY, Ask(), self._on_health, timeout_s=0.5)
 
     def _on_health(self, answers: list[Answer[Health]]) -> None:
         told = {

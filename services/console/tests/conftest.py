@@ -21,7 +21,9 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.task import Task
 from hmcs_console.service import Console
+from hmcs_console.serving.gateway import Served
 from hmcs_console.settings import ConsoleSettings
+from support.doors import Behind, Door
 from support.made_up import line_model
 
 DEADLINE_S = 10.0
@@ -228,5 +230,24 @@ def make_process(make_cell: Callable[..., Cell]) -> Iterator[Callable[..., Proce
             process = Process(*arguments)
             stack.callback(process.close)
             return process
+
+        yield make
+
+
+@pytest.fixture
+def behind() -> Iterator[Behind]:
+    made = Behind()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def make_door(behind: Behind) -> Iterator[Callable[..., Door]]:
+    with ExitStack() as stack:
+
+        def make(**settings: Any) -> Door:
+            door = Door(behind, Served(**({"host": "127.0.0.1", "port": 0} | settings)))
+            stack.callback(door.gateway.close)
+            return door
 
         yield make

@@ -10,14 +10,12 @@ import dataclasses
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt
-from pydantic import BaseModel
 
-from hmcs.bus.examples import EXAMPLES
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import (
     MESSAGES,
@@ -29,7 +27,6 @@ from hmcs.bus.messages import (
     Label,
     Message,
     Outline,
-    Part,
     Refusal,
     RobotLooks,
     RobotState,
@@ -48,42 +45,9 @@ from hmcs_console.teaching import takeover
 from hmcs_console.teaching.marking import Marking
 from hmcs_console.teaching.takes import Take, opened
 from hmcs_console.view import View
+from support.texts import EXAMPLE_OF, HOSTILE, Path, fields, filled
 
 LOG = logging.getLogger("test")
-PAYLOADS = (
-    "<img src=x onerror=alert(1)>",
-    "<iframe srcdoc='<script>top.x=1</script>'>",
-    "<script>alert(1)</script>",
-    "</p></div><style>*{display:none}</style>",
-    "&lt;b&gt; &amp;lt; &#60;",
-    "![x](https://evil.example/a.png)",
-    "![x](/etc/passwd)",
-    "[press](javascript:alert(1))",
-    "[a]: https://evil.example",
-    "<https://evil.example>",
-    "https://evil.example/x",
-    "www.evil.example",
-    "me@evil.example",
-    "{alert(1)} ${alert(1)} {{x}} {0}",
-    "**b** *i* _u_ ~~s~~ `c`",
-    "```js",
-    "# head",
-    "- item",
-    "1. item",
-    "> quote",
-    "| a | b |",
-    "---",
-    "    code",
-    "\\\\*a\\\\* \\\\",
-    "a\nb\n\n<b>c</b>\r\n# d",
-    "\x1b[2J\x1b]0;x\x07\x9b31m",
-    "\u202eevil\u2066\u200b\ufeff",
-    "a" + "\u0301" * 40,
-    "../../x",
-    "__proto__",
-    "%s %(x)s {x.__class__}",
-    " ",
-)
 LONG = "<b>" + "x" * 100_000
 JOINER = "\u2060"
 # As remark-gfm makes links of running text.
@@ -94,57 +58,11 @@ LINKS = (
 NODE = re.compile(r"(/[A-Za-z0-9._~%-]+)+|/|")
 
 
-# --- every text field of a message ----------------------------------------------------------------
-
-Path = tuple[str | int, ...]
-NO_TEXT = (bytes, int, float, bool, type(None))
-
-
-def texts_in(kind: Any) -> Iterator[Path]:
-    """Paths to the texts in a value of a type; of many alike the first."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        for name, field in kind.model_fields.items():
-            yield from ((name, *path) for path in texts_in(field.annotation))
-    elif kind is str:
-        yield ()
-    elif kind is Any:
-        yield ("anything",)
-    elif get_origin(kind) in (Literal, np.ndarray) or kind in NO_TEXT:
-        return
-    elif get_origin(kind) is tuple:
-        yield from ((0, *path) for path in texts_in(get_args(kind)[0]))
-    elif get_origin(kind) is dict:
-        key, value = get_args(kind)
-        yield from (("a key", *path) for path in texts_in(key))
-        yield from (("a value", *path) for path in texts_in(value))
-    else:
-        for argument in get_args(kind):
-            yield from texts_in(argument)
-
-
-def filled(value: Any, path: Path, text: str) -> Any:
-    """A value with a text at a path."""
-    if not path:
-        return text
-    first, *rest = path
-    if isinstance(value, Part):
-        inner = filled(getattr(value, str(first)), tuple(rest), text)
-        return value.model_copy(update={str(first): inner})
-    if first == 0:
-        return (filled(value[0], tuple(rest), text), *value[1:])
-    if first == "a key":
-        return {text: next(iter(value.values()), 1)}
-    if first == "a value":
-        return {"name": filled(None, tuple(rest), text)}
-    return {"anything": text}
-
-
-OF: Mapping[type[Message], Message] = {type(example): example for example in EXAMPLES}
-FIELDS = [(kind, path) for kind in MESSAGES for path in dict.fromkeys(texts_in(kind))]
+FIELDS = fields()
 
 
 def test_every_message_has_an_example_and_its_texts_are_found() -> None:
-    assert set(OF) == set(MESSAGES)
+    assert set(EXAMPLE_OF) == set(MESSAGES)
     found = {(kind.__name__, path) for kind, path in FIELDS}
     assert ("Belief", ("states", 0)) in found
     assert ("Health", ("refused", "a key")) in found
@@ -212,7 +130,7 @@ KEPT: Mapping[type[Message], Keep] = {
 NOT_SHOWN = {
     *("Motion", "Step", "Command", "Handle", "Ask", "Description", "SettingsReport"),
     *("LastStepsQuestion", "LastSteps", "LoadModel", "ActivateRecognizer", "Record", "Train"),
-    *("OutlineQuestion", "SetLabels"),
+    *("OutlineQuestion", "SetLabels", "Pairing", "StopRequest"),
 }
 """What the page says, or has no use for."""
 READ = {
@@ -356,19 +274,19 @@ def look_at(sent: Sent, what: str) -> str:
 
 def fed(kind: type[Message], path: Path, text: str) -> Seen:
     seen = Seen(())
-    seen.robot_moved(10.0, OF[RobotState])  # type: ignore[arg-type]
-    seen.fixture_changed(10.0, OF[FixtureState])  # type: ignore[arg-type]
-    keep_belief(seen, OF[Belief])  # type: ignore[arg-type]
+    seen.robot_moved(10.0, EXAMPLE_OF[RobotState])  # type: ignore[arg-type]
+    seen.fixture_changed(10.0, EXAMPLE_OF[FixtureState])  # type: ignore[arg-type]
+    keep_belief(seen, EXAMPLE_OF[Belief])  # type: ignore[arg-type]
     if path == ("states", 0):
         # What is likely is what is read.
         seen = Seen(())
-    body = filled(OF[kind], path, text)
+    body = filled(EXAMPLE_OF[kind], path, text)
     if path == ("states", 0) and isinstance(body, Belief):
         body = body.model_copy(update={"probabilities": np.array([0.75, 0.125])})
-        seen.fixture_changed(10.0, OF[FixtureState])  # type: ignore[arg-type]
+        seen.fixture_changed(10.0, EXAMPLE_OF[FixtureState])  # type: ignore[arg-type]
     if path == ("missing_gestemes", 0):
         seen = Seen(())
-        seen.fixture_changed(10.0, OF[FixtureState])  # type: ignore[arg-type]
+        seen.fixture_changed(10.0, EXAMPLE_OF[FixtureState])  # type: ignore[arg-type]
     KEPT[kind](seen, body)
     return seen
 
@@ -384,7 +302,7 @@ SHOWN = [(kind, path) for kind, path in FIELDS if kind in KEPT]
 def test_every_text_of_a_message_is_shown_as_it_reads(
     sent: Sent, kind: type[Message], path: Path
 ) -> None:
-    for text in (*PAYLOADS, LONG):
+    for text in (*HOSTILE, LONG):
         seen = fed(kind, path, text)
         sent.draw(seen)
         told = look_at(sent, f"{kind.__name__} {path} {text[:40]!r}")

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import http.client
 import logging
 import socket
-import ssl
-import threading
-import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
 
 import msgpack
 import pytest
-import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
 from websockets.sync.client import connect
-from websockets.sync.server import Server, ServerConnection, serve
 from websockets.typing import Subprotocol
 
 from hmcs.bus.service import UserError
@@ -31,117 +22,11 @@ from hmcs_console.serving.gateway import (
     MOST_PAGES,
     Gateway,
     Served,
-    encryption,
 )
+from support.doors import DEADLINE_S, PRESSED, Behind, Door, until, until_closed
 
-DEADLINE_S = 20.0
-CERTIFICATES = Path(__file__).parent / "certificates"
-CERTIFICATE, KEY = CERTIFICATES / "localhost.pem", CERTIFICATES / "localhost.key"
 TOKEN = "a-long-secret"
-PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
-PRESSED = {"type": "CommandTriggerMessage", "uuid": "abc"}
-
-
-class Behind:
-    """The page's own server: it hears, and says what it was made to say."""
-
-    def __init__(self) -> None:
-        self.heard: list[Any] = []
-        self.requests: list[str] = []
-        self._server: Server = serve(
-            self._converse, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None
-        )
-        self.port: int = self._server.socket.getsockname()[1]
-        self._thread = threading.Thread(target=self._server.serve_forever)
-        self._thread.start()
-
-    def close(self) -> None:
-        self._server.shutdown()
-        self._thread.join()
-
-    def _converse(self, connection: ServerConnection) -> None:
-        assert connection.request is not None
-        self.requests.append(str(connection.request.headers))
-        connection.send(b"hello")
-        with contextlib.suppress(ConnectionClosed):
-            for message in connection:
-                self.heard.append(msgpack.unpackb(message))  # type: ignore[arg-type]
-
-
-class Door:
-    """A gateway, and what it says."""
-
-    def __init__(self, behind: Behind, served: Served) -> None:
-        self.log = logging.Logger("door")
-        self.lines: list[logging.LogRecord] = []
-        handler = logging.Handler()
-        handler.emit = self.lines.append  # type: ignore[method-assign]
-        self.log.addHandler(handler)
-        self.refused: list[str] = []
-        self.gateway = Gateway(served, behind.port, self.log, self.refused.append)
-        self.port = self.gateway.port
-
-    def page(self, **settings: Any) -> Any:
-        """A page that is open, as far as the wire can tell."""
-        scheme = "wss" if "ssl" in settings else "ws"
-        return connect(
-            f"{scheme}://127.0.0.1:{self.port}",
-            subprotocols=[PROTOCOL],
-            compression=None,
-            open_timeout=DEADLINE_S,
-            **settings,
-        )
-
-    def get(self, path: str = "/", method: str = "GET", **headers: str) -> http.client.HTTPResponse:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=DEADLINE_S)
-        connection.request(method, path, headers=headers)
-        response = connection.getresponse()
-        response.body = response.read()  # type: ignore[attr-defined]
-        connection.close()
-        return response
-
-    def said(self, data: bytes) -> bytes:
-        """What it answers to bytes, until it closes."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=DEADLINE_S) as raw:
-            raw.sendall(data)
-            return until_closed(raw)
-
-
 MakeDoor = Callable[..., Door]
-
-
-@pytest.fixture
-def behind() -> Iterator[Behind]:
-    made = Behind()
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def make_door(behind: Behind) -> Iterator[MakeDoor]:
-    with contextlib.ExitStack() as stack:
-
-        def make(**settings: Any) -> Door:
-            door = Door(behind, Served(**({"host": "127.0.0.1", "port": 0} | settings)))
-            stack.callback(door.gateway.close)
-            return door
-
-        yield make
-
-
-def until(condition: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.005)
-
-
-def until_closed(raw: socket.socket) -> bytes:
-    heard = b""
-    with contextlib.suppress(ConnectionError):
-        while data := raw.recv(65_536):
-            heard += data
-    return heard
 
 
 def test_the_page_is_sent_with_a_policy_that_lets_nothing_else_in(make_door: MakeDoor) -> None:
@@ -317,72 +202,4 @@ def test_who_brings_the_token_is_let_in_by_a_session(make_door: MakeDoor) -> Non
 def test_a_page_without_a_token_is_not_served_where_others_reach_it(behind: Behind) -> None:
     for host in ("0.0.0.0", ""):
         with pytest.raises(UserError, match="reached from other machines: give a token"):
-            Gateway(Served(host, 0), behind.port, logging.getLogger("x"), lambda _: None)
-
-
-@pytest.fixture
-def trusting() -> ssl.SSLContext:
-    return ssl.create_default_context(cafile=CERTIFICATE)
-
-
-def test_with_a_certificate_the_page_is_served_encrypted_and_no_other_way(
-    make_door: MakeDoor, behind: Behind, trusting: ssl.SSLContext
-) -> None:
-    door = make_door(token=TOKEN, encryption=encryption(CERTIFICATE, KEY))
-    assert not door.said(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n").startswith(b"HTTP")
-    connection = http.client.HTTPSConnection("127.0.0.1", door.port, context=trusting)
-    connection.request("GET", f"/?token={TOKEN}")
-    brought = connection.getresponse()
-    assert brought.status == 303
-    cookie = brought.headers["Set-Cookie"]
-    assert "Secure" in cookie.split("; ")
-    headers = {"Cookie": cookie.partition(";")[0], "Origin": f"https://127.0.0.1:{door.port}"}
-    with door.page(ssl=trusting, additional_headers=headers) as page:
-        assert page.recv(timeout=DEADLINE_S) == b"hello"
-        page.send(msgpack.packb(PRESSED))
-        until(lambda: behind.heard == [PRESSED])
-
-
-def test_many_encrypted_connections_at_once_are_served(
-    make_door: MakeDoor, trusting: ssl.SSLContext
-) -> None:
-    door = make_door(encryption=encryption(CERTIFICATE, KEY))
-
-    def get(_: int) -> int:
-        connection = http.client.HTTPSConnection(
-            "127.0.0.1", door.port, context=trusting, timeout=DEADLINE_S
-        )
-        with contextlib.closing(connection):
-            connection.request("GET", "/")
-            return len(connection.getresponse().read())
-
-    with ThreadPoolExecutor(20) as pool:
-        assert set(pool.map(get, range(100))) == {len(load_document().body)}
-
-
-def test_connections_that_never_say_hello_are_bounded_with_a_certificate_too(
-    make_door: MakeDoor,
-) -> None:
-    door = make_door(encryption=encryption(CERTIFICATE, KEY))
-    with contextlib.ExitStack() as stack:
-        for _ in range(2 * MOST_CONNECTIONS):
-            stack.enter_context(socket.create_connection(("127.0.0.1", door.port)))
-        until(lambda: len(door.refused) == 2 * MOST_CONNECTIONS - MOST_OF_AN_ADDRESS)
-    until(lambda: not door.gateway._connections)
-
-
-@pytest.mark.parametrize(
-    ("certificate", "key", "told"),
-    [
-        ("nowhere.pem", KEY, "No such file"),
-        (CERTIFICATE, "nowhere.key", "No such file"),
-        (KEY, CERTIFICATE, "give PEM files"),
-        (CERTIFICATE, CERTIFICATES / "with-password.key", "asks for a password"),
-        (Path(__file__), KEY, "give PEM files"),
-    ],
-)
-def test_a_certificate_that_cannot_be_used_is_told(
-    certificate: Path | str, key: Path | str, told: str
-) -> None:
-    with pytest.raises(UserError, match=told):
-        encryption(Path(certificate), Path(key))
+            Gateway(Served(host, 0), behind, logging.getLogger("x"), lambda _: None)

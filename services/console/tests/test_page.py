@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import msgpack
 import numpy as np
 import pytest
 import viser
+import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
@@ -75,6 +77,13 @@ def browser(cell: Any) -> ClientConnection:
         compression=None,
         max_size=None,
     )
+    camera(connection)
+    cell.until(lambda: cell.service.page._handles, "its handle")
+    return connection
+
+
+def camera(connection: ClientConnection) -> None:
+    """Say from where the first page looks, which is what makes it one."""
     axis = (0.0, 0.0, 1.0)
     turn = (1.0, 0.0, 0.0, 0.0)
     tell(
@@ -83,8 +92,6 @@ def browser(cell: Any) -> ClientConnection:
         **{"wxyz": turn, "position": axis, "look_at": axis, "up_direction": axis},
         **{"fov": 1.0, "near": 0.1, "far": 9.0, "image_height": 9, "image_width": 9},
     )
-    cell.until(lambda: cell.service.page._handles, "its handle")
-    return connection
 
 
 def tell(connection: ClientConnection, what: str, **fields: Any) -> None:
@@ -97,6 +104,67 @@ def drag(connection: ClientConnection, place: tuple[Any, ...], *phases: str) -> 
         pose = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": place} if phase == "Update" else {}
         message = f"TransformControls{phase}Message"
         tell(connection, message, name="/handle", owner="0", **pose)
+
+
+def test_the_pages_own_server_hears_nobody_but_the_door(make_cell: MakeCell) -> None:
+    cell = make_cell(lease_s=2.0)
+    page = cell.service.page
+    with browser(cell):
+        stranger = connect(
+            f"ws://127.0.0.1:{page.server.get_port()}",
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            compression=None,
+            max_size=None,
+        )
+
+        def drag_until_closed() -> None:
+            camera(stranger)
+            drag(stranger, (0.6, 0.0, 0.25), "Update", "DragStart")
+            while True:
+                stranger.recv(timeout=10.0)
+
+        with stranger, pytest.raises(ConnectionClosed):
+            drag_until_closed()
+        cell.wait(0.2)
+        assert page.viewers == 1
+        assert len(page._handles) == 1
+        assert not cell.handles
+
+
+def asked_of(data: bytes) -> list[str]:
+    """Numbers of the questions in what the page's server says, whether a page lives."""
+    packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]
+    size = int.from_bytes(data[:8], "little")
+    told = msgpack.unpackb(zstandard.ZstdDecompressor().decompress(packed, max_output_size=size))
+    kind = "LocalStorageGetItemRequestMessage"
+    return [said["request_uuid"] for said in told["messages"] if said["type"] == kind]
+
+
+def test_a_still_hand_holds_on_as_long_as_its_page_shows_that_it_lives(
+    make_cell: MakeCell,
+) -> None:
+    cell = make_cell(lease_s=0.5)
+    with browser(cell) as connection:
+        living = threading.Event()
+        living.set()
+
+        def live() -> None:
+            with contextlib.suppress(ConnectionClosed):
+                while True:
+                    for number in asked_of(connection.recv()):
+                        if living.is_set():
+                            what = "LocalStorageGetItemResponseMessage"
+                            tell(connection, what, value=None, error=None, request_uuid=number)
+
+        thread = threading.Thread(target=live, daemon=True)
+        thread.start()
+        drag(connection, (0.6, 0.0, 0.5), "Update", "DragStart")
+        cell.until(lambda: cell.handles and cell.handles[-1][1].dead_man, "a held handle")
+        cell.wait(2.0)
+        assert cell.handles[-1][1].dead_man
+        living.clear()
+        cell.until(lambda: not cell.handles[-1][1].dead_man, "the release")
+    thread.join()
 
 
 def test_a_burst_of_a_browser_is_cut_and_its_last_position_and_release_come_through(

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from hmcs.bus.keys import Member
-from hmcs.bus.messages import Ask, Done
+from hmcs.bus.messages import Ask, Done, StopRequest
 from hmcs.bus.session import RequestRefusedError
 from hmcs_console.operating.handles import Grabbed
-from hmcs_console.operating.stopping import said
+from hmcs_console.operating.stopping import MOST_ASKED, said
 
 MakeCell = Callable[..., Any]
 MakeProcess = Callable[..., Any]
@@ -85,6 +85,51 @@ def test_a_robot_that_gives_no_answer_may_still_move_which_is_told_and_holds_nob
         "what came of it",
     )
     ending.set()
+
+
+def test_every_robot_is_asked_at_once_however_many_do_not_answer(
+    make_cell: MakeCell, make_process: MakeProcess
+) -> None:
+    cell = make_cell()
+    ending = threading.Event()
+    asked: list[float] = []
+
+    def hangs(_: Ask) -> Done:
+        asked.append(time.monotonic())
+        ending.wait(20.0)
+        return Done(detail="late")
+
+    names = [f"hung-{number}" for number in range(12)]
+    for name in names:
+        robot(make_process, cell, name, hangs)
+    robot(make_process, cell, "well", stands)
+    seen = cell.service._seen
+    cell.until(lambda: len(seen.members) == 13, "all of them")
+    cell.service.stop()
+    cell.until(lambda: "robot well stands" in cell.service.answer, "the one that answers")
+    # None of those that hang has given up yet.
+    assert all(f"robot {name} is asked to stand" in cell.service.answer for name in names)
+    cell.until(lambda: len(asked) == 12, "each to have been asked")
+    cell.until(lambda: cell.service.answer.count("gave no answer") == 12, "what came of it")
+    assert all(f"robot {name} **may still move**" in cell.service.answer for name in names)
+    ending.set()
+
+
+def test_whoever_hears_it_is_told_to_stand_seen_or_not(make_cell: MakeCell) -> None:
+    cell = make_cell()
+    for number in range(2 * MOST_ASKED):
+        cell.other.announce(cell.other.keys.presence("robot", f"a-ghost-{number}"))
+    heard: list[StopRequest] = []
+    keys = cell.other.keys
+    cell.other.subscribe(StopRequest, keys.stop_request, lambda got: heard.append(got.body))
+    cell.until(lambda: cell.service._stopping._requests.matching, "the console")
+    cell.until(lambda: len(cell.service._seen.members) == 2 * MOST_ASKED, "ghosts")
+    cell.service.stop()
+    cell.until(lambda: heard, "the message")
+    assert heard[0].reason == "Stop on the page of console x"
+    cell.until(lambda: "is asked to stand" not in cell.service.answer, "what came of it")
+    assert cell.service.answer.count("**may still move**") == 2 * MOST_ASKED
+    assert cell.service.answer.count("not asked") == MOST_ASKED
 
 
 def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:

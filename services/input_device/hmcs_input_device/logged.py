@@ -9,6 +9,7 @@ import numpy as np
 
 from hmcs.bus.messages import Motion
 from hmcs.errors import UserError
+from hmcs.recordings.hands import hand_of
 from hmcs.recordings.reading import read
 from hmcs.task import Task
 from hmcs_input_device.settings import InputDeviceSettings
@@ -61,12 +62,14 @@ def recording(settings: InputDeviceSettings, task: Task) -> Logged:
             "demonstration: the source 'recording' needs one: give an MCAP file with "
             "--demonstration"
         )
-    taken = [(recorded, motion) for recorded, _, motion in read(settings.demonstration).of(Motion)]
+    taken = list(hand_of(read(settings.demonstration)))
     if not taken:
-        raise UserError(f"{settings.demonstration}: has no samples of a device: record one anew")
-    first_ns = taken[0][0].captured_ns
-    times_s = np.maximum.accumulate([(r.captured_ns - first_ns) / 1e9 for r, _ in taken])
-    motions = [motion for _, motion in taken]
+        raise UserError(
+            f"{settings.demonstration}: has no samples of a device that was held: record one anew"
+        )
+    first_ns = taken[0].captured_ns
+    times_s = np.maximum.accumulate([(each.captured_ns - first_ns) / 1e9 for each in taken])
+    motions = [each.motion for each in taken]
     if settings.speed != 1.0:
         motions = [_faster(motion, settings.speed) for motion in motions]
     return Logged((times_s / settings.speed).tolist(), motions, settings.lead_in_s)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hmcs.bus import messages
+from hmcs.bus.messages import Motion
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.motion.paths import Path as Curve
@@ -18,6 +20,7 @@ from hmcs.task import find_task, load_task
 from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.sources import LIVE, Source, open_source
+from support.recordings import BEGUN_NS, PERIOD_NS, Maker
 
 SHAPES = load_task("human-shapes")
 LINES = load_task("lines-through-obstacles")
@@ -184,3 +187,21 @@ def test_a_device_that_cannot_be_loaded_or_is_not_there_is_a_users_mistake() -> 
         "simulated, spacemouse, synthetic",
     ):
         opened(source="joystick")
+
+
+def test_a_recording_is_played_without_the_devices_that_did_not_drive(tmp_path: Path) -> None:
+    maker = Maker(tmp_path)
+    recording = maker.begin()
+    for number in range(60):
+        for boot, x_m, dead_man in (("hand", 0.001 * number, number >= 10), ("page", 5.0, False)):
+            motion = Motion(
+                position=np.array([x_m, 0.0, 0.0]), velocity=np.zeros(3), dead_man=dead_man
+            )
+            device = messages.Source(service="input_device", instance=boot, boot=boot)
+            fields = maker.fields(motion, number, device)
+            recording.write("k", fields, BEGUN_NS + number * PERIOD_NS, None)
+    recording.finish()
+    source = opened(source="recording", demonstration=recording.path, lead_in_s=0.1)
+    samples = [source.sample(0.1 + 0.01 * k + 1e-4) for k in range(50)]
+    places_m = [round(sample.position[0], 6) for sample in samples if sample is not None]
+    assert places_m == [round(0.001 * k, 6) for k in range(10, 60)]

@@ -1,7 +1,9 @@
 """The figures: all of the issue's list, drawn, told by what they show, and the same for a seed."""
 
 import json
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ import pytest
 from hmcs.errors import UserError
 from hmcs_laboratory.command import main
 from hmcs_laboratory.figures.catalog import FIGURES, find_figures
-from hmcs_laboratory.figures.run import FINDINGS, PAGE, make, make_figures, write
+from hmcs_laboratory.figures.page import page
+from hmcs_laboratory.figures.run import FINDINGS, PAGE, Made, make, make_figures, write
 
 NUMBERS = [
     *("2.5", "2.6", "2.7", "2.8", "2.9", "2.10", *(f"2.{number}" for number in range(12, 18))),
@@ -172,6 +175,18 @@ def test_a_page_tells_of_each_figure_and_its_pictures_are_there(folder):
             assert f"<code>{name}</code>" in page
     assert "4.12" not in page
     assert "seed 1" in page.lower()
+
+
+def test_a_page_shows_texts_as_they_read():
+    evil = '"><script>top.ran=1</script>\x1b[2J'
+    (figure,) = find_figures(["2.5"])
+    named = replace(figure, title=evil, shows=evil, data_of=evil, stand_in=evil)
+    made = Made("2.5", {}, {"seed": evil}, {}, evil, evil, 0.0)
+    settings = type("Settings", (), {"model_fields": {"seed": SimpleNamespace(description=evil)}})
+    text = page([replace(named, settings=settings())], [made], fast=False, seed=1)
+    assert "<script" not in text
+    assert "\x1b" not in text
+    assert text.count("&lt;script&gt;top.ran=1&lt;/script&gt;\\x1b[2J") >= 8
 
 
 def test_a_figure_is_the_same_whatever_else_is_made_and_by_how_many(folder, tmp_path):

@@ -10,13 +10,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from hmcs.bus.keys import ANY
-from hmcs.bus.messages import Ask, Description, Message, SettingsReport
+from hmcs.bus.messages import Ask, Message
 from hmcs.bus.session import Answer, Bus, StoppedError
+from hmcs.bus.verbs import DESCRIBE, SETTINGS, Verb
 from hmcs.recordings.parts import Preface, as_fields
 from hmcs.recordings.reading import LARGEST_ATTACHMENT_BYTES
 
-M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+A = TypeVar("A", bound=Message)
 
 ASK_S = 0.5
 
@@ -25,11 +26,11 @@ def preface_of(bus: Bus, models: Sequence[Path], log: logging.Logger) -> Preface
     """Return who is there, what they are told to do, and the models they work with."""
     members = {
         f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
-        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "describe"), Ask(), Description)
+        for answer in ask_all(bus, DESCRIBE, Ask())
     }
     settings = {
         f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body.settings
-        for answer in ask_all(bus, bus.keys.rpc(ANY, ANY, "settings"), Ask(), SettingsReport)
+        for answer in ask_all(bus, SETTINGS, Ask())
     }
     metadata = {
         "hmcs": as_fields(
@@ -56,10 +57,10 @@ def joined(*prefaces: Preface) -> Preface:
     )
 
 
-def ask_all(bus: Bus, key: str, question: Message, answer_type: type[M]) -> list[Answer[M]]:
+def ask_all(bus: Bus, verb: Verb[Q, A], question: Q) -> list[Answer[A]]:
     """Return what all that are there answer; nothing once this process is to end."""
     try:
-        return bus.ask(key, question, answer_type, ASK_S)
+        return verb.ask(bus, question, timeout_s=ASK_S)
     except StoppedError:
         return []
 

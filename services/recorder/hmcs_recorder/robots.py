@@ -6,9 +6,9 @@ import logging
 import time
 from collections.abc import Iterator
 
-from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Ask, RobotLooks
 from hmcs.bus.session import Bus
+from hmcs.bus.verbs import LOOKS
 from hmcs.recordings.parts import Preface, Recording
 from hmcs_recorder.prefacing import ask_all
 
@@ -32,8 +32,7 @@ class Robots:
 
     def ask(self) -> None:
         """Ask all that are there."""
-        key = self._bus.keys.rpc("robot", ANY, "looks")
-        for answer in ask_all(self._bus, key, Ask(), RobotLooks):
+        for answer in ask_all(self._bus, LOOKS, Ask()):
             self._looks[answer.body.robot] = answer.body
 
     def kept(self) -> Iterator[Preface]:
@@ -47,17 +46,17 @@ class Robots:
                 yield _unknown(robot)
 
     def name_joints(self, recording: Recording, now_ns: int) -> None:
-        """Have the robots in a recording shown by the names of their joints, asking some again.
+        """Keep how the robots in a recording look, and show them by the names of their joints.
 
-        That nobody says them is said in the recording and in the log. Raises OSError as writing
-        does.
+        Those of which that is not known are asked again; that one gives no answer is said in the
+        recording and in the log. Raises OSError as writing does.
         """
-        nameless = recording.nameless
-        for robot in nameless & self._looks.keys():
+        undescribed = recording.undescribed
+        for robot in undescribed & self._looks.keys():
             recording.name_joints(robot, self._looks[robot].joints)
         waiting = {
             robot
-            for robot in nameless - self._looks.keys()
+            for robot in undescribed - self._looks.keys()
             if self._asked.get(robot, 0) < MOST_ASKED
         }
         if not waiting or time.monotonic() < self._again_s:
@@ -74,7 +73,7 @@ class Robots:
             if self._asked[robot] == MOST_ASKED:
                 recording.add(_unknown(robot), now_ns)
                 self._log.warning(
-                    "a robot does not say how it looks: viewers cannot show its joints",
+                    "a robot does not say how it looks: viewers cannot show it",
                     extra={"robot": robot},
                 )
 
@@ -86,5 +85,5 @@ def _kept(looks: RobotLooks) -> Preface:
 
 
 def _unknown(robot: str) -> Preface:
-    facts = {"unknown": "it gives no answer to `looks`: its joints cannot be shown"}
+    facts = {"unknown": "it gives no answer to `looks`: it cannot be shown by its description"}
     return Preface({f"{JOINTS}{robot}": facts}, {})

@@ -15,13 +15,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from hmcs.bus.counters import Sequences
-from hmcs.bus.keys import ANY, check_name
+from hmcs.bus.keys import check_name
 from hmcs.bus.logs import Seldom
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import (
     Done,
     Envelope,
-    LastSteps,
     LastStepsQuestion,
     Outline,
     OutlineQuestion,
@@ -30,6 +29,7 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.verbs import LAST_STEPS, OUTLINE, RECORD, SET_LABELS
 from hmcs.bus.wire import encode
 from hmcs.errors import UserError
 from hmcs.recordings.label_files import has_fingerprint
@@ -74,9 +74,9 @@ class Recorder(Service):
 
     def start(self) -> None:
         """Listen, and record unless told to wait."""
-        self.bus.answer("record", Record, self._asked)
-        self.bus.answer("outline", OutlineQuestion, self._outline, aside=self._reading)
-        self.bus.answer("set_labels", SetLabels, self._set_labels, aside=self._reading)
+        RECORD.answer(self.bus, self._asked)
+        OUTLINE.answer(self.bus, self._outline, aside=self._reading)
+        SET_LABELS.answer(self.bus, self._set_labels, aside=self._reading)
         self.bus.listen(self.bus.keys.everything, self._on_arrival)
         if self.settings.autostart:
             self._begin("")
@@ -259,9 +259,8 @@ class Recorder(Service):
     def _write_past_steps(self, recording: Recording, begun_ns: int) -> None:
         """Begin with the steps made before: recognizers know them, and so must a replay."""
         bus = self.bus
-        key = bus.keys.rpc("input_device", ANY, "last_steps")
         question = LastStepsQuestion(count=MOST_PAST_STEPS)
-        for answer in ask_all(bus, key, question, LastSteps)[:1]:
+        for answer in ask_all(bus, LAST_STEPS, question)[:1]:
             for step, origin in zip(answer.body.steps, answer.body.origins, strict=False):
                 # A device numbers its steps as it numbers their messages.
                 envelope = Envelope(source=answer.envelope.source, seq=step.index, origin=origin)

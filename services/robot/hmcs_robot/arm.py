@@ -49,6 +49,7 @@ class Arm:
             np.array([info[9] for info in turning]),
             np.array(speeds, dtype=float),
         )
+        self._link_names: dict[int, str] = {info[0]: info[12].decode() for info in infos}
         self._movable = len(movable)
         self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
         self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
@@ -73,6 +74,10 @@ class Arm:
                 self.body, self.body, CLEAR_AT_HOME_M, one, other, physicsClientId=self._client
             )
         ]
+
+    def link_name(self, link: int) -> str:
+        """Return the name of a link, as in the URDF."""
+        return self._link_names.get(link, "base")
 
     def place(self, joint_positions: Array) -> None:
         """Put the arm at `joint_positions`, rad, shape (n,), at rest."""

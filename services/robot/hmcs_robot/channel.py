@@ -202,5 +202,5 @@ def pack_snapshot(snapshot: Snapshot) -> bytes:
 def unpack_snapshot(data: bytes) -> Snapshot:
     """Return the snapshot in a datagram of `pack_snapshot`."""
     values = msgpack.unpackb(data, use_list=False)
-    arrays = (np.frombuffer(values[place]) for place in range(len(_ARRAYS)))
-    return Snapshot(*arrays, *values[len(_ARRAYS) :])
+    arrays = [np.frombuffer(values[place]) for place in range(len(_ARRAYS))]
+    return Snapshot._make([*arrays, *values[len(_ARRAYS) :]])

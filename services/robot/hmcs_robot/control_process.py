@@ -55,7 +55,11 @@ def main(argv: list[str]) -> int:
         gc.collect()
         gc.freeze()
         gc.disable()
-        ready = {"priority": priority, "joint_names": driver.joint_names}
+        ready = {
+            "priority": priority,
+            "joint_names": driver.joint_names,
+            "links_within": driver.links_within,
+        }
         channel.send(json.dumps({"ready": ready}).encode())
         try:
             _run(channel, ControlLoop(driver, rules, time.monotonic_ns()), settings)

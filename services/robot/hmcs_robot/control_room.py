@@ -53,6 +53,7 @@ class ControlRoom:
             raise UserError(told["mistake"])
         self.priority: str = told["ready"]["priority"]
         self.joint_names: tuple[str, ...] = tuple(told["ready"]["joint_names"])
+        self.links_within: tuple[str, ...] = tuple(told["ready"]["links_within"])
 
     @property
     def running(self) -> bool:

@@ -99,6 +99,8 @@ class ArmDriver(Protocol):
     limits: JointLimits
     joint_names: tuple[str, ...]
     """As in the URDF, n of them."""
+    links_within: tuple[str, ...]
+    """Links that are not kept out of a forbidden region, since they reach into it at the start."""
 
     def read(self) -> ArmState:
         """Return where the arm is now."""

@@ -84,6 +84,11 @@ class Robot(Service):
         bus.subscribe(Command, bus.keys.command, self._on_command)
         bus.subscribe(StopRequest, bus.keys.stop_request, self._on_stop_request)
         bus.subscribe(Pairing, bus.keys.pairing, self._on_pairing)
+        if self._room.links_within:
+            self.log.warning(
+                "links that reach into a forbidden region at the start are not kept out of it",
+                extra={"links": ", ".join(self._room.links_within)},
+            )
         bus.every(SIGN_EVERY_S, self._give_sign)
         self._room.read(self._take_snapshot, lambda: bus.soon(self._on_end))
 
@@ -105,6 +110,7 @@ class Robot(Service):
             "task": self._task.name,
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
             "speed_limit_m_s": f"{self._task.robot.speed_limit_m_s:g}",
+            "links_not_kept_out": ", ".join(self._room.links_within),
             "control_priority": self._room.priority,
             "late_ticks": str(self._snapshot.late_ticks if self._snapshot else 0),
         }

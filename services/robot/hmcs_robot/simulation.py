@@ -25,6 +25,8 @@ _SELF_MARGIN_M = 0.005
 _LINKS_WITHIN_M = 0.08
 """Links nearer to a forbidden region than this are slowed down: farther than an arm that moves at
 0.25 m/s goes while it slows to a stand."""
+_WITHIN_M = 0.002
+"""A link so near to a region at the start pose, or inside, is not kept out of that region."""
 ITSELF = "itself"
 """What an arm touches whose own links meet."""
 
@@ -49,8 +51,10 @@ class Simulation:
     """An arm that is moved by its joints' motors, each with the torque it has.
 
     One `move` is one step of the physics of `period_s`. The arm and the obstacles collide; the arm
-    stops where its own links meet. Raises UnreachablePoseError where the arm cannot reach the start
-    pose, StartPoseError where it touches an obstacle there, UserError where no window opens.
+    stops where its own links meet. `links_within` names the links that reach into a forbidden
+    region at the start pose already, and so are not kept out of it. Raises UnreachablePoseError
+    where the arm cannot reach the start pose, StartPoseError where it touches an obstacle there,
+    UserError where no window opens.
     """
 
     def __init__(
@@ -90,6 +94,12 @@ class Simulation:
                 force=100,
                 physicsClientId=self._client,
             )
+        # A base that stands behind the plane of a table is there to stay.
+        self._within = {
+            (link, body) for link, body, distance, *_ in self._link_points() if distance < _WITHIN_M
+        }
+        within = {(self.arm.link_name(link), self._regions[b]) for link, b in self._within}
+        self.links_within = tuple(f"{link} in {name}" for link, name in sorted(within))
         touched = self.read().contacts
         if ITSELF in touched:
             self.close()
@@ -102,13 +112,6 @@ class Simulation:
             raise StartPoseError(
                 f"robot {scene.robot} touches {', '.join(touched)} at the start pose of the task: "
                 "move the obstacle or choose another tool_start_m"
-            )
-        inside = sorted({near.name for near in self._links_near(self.home) if near.distance_m < 0})
-        if inside:
-            self.close()
-            raise StartPoseError(
-                f"links of robot {scene.robot} reach into forbidden region {', '.join(inside)} at "
-                "the start pose of the task: move the region or choose another tool_start_m"
             )
 
     def read(self) -> ArmState:
@@ -173,18 +176,24 @@ class Simulation:
         return nearest, (*touches, *self._meeting_links(positions))
 
     def _links_near(self, positions: Array) -> tuple[LinkNear, ...]:
-        near = []
-        for body, name in self._regions.items():
+        return tuple(
+            LinkNear(
+                self._regions[body],
+                distance,
+                self.arm.separation_per_joint(link, on_arm, normal, positions),
+            )
+            for link, body, distance, on_arm, normal in self._link_points()
+            if (link, body) not in self._within
+        )
+
+    def _link_points(self) -> Iterator[tuple[int, int, float, Array, Array]]:
+        """Yield link, region, distance, m, the point on the link and the normal, (3,) each."""
+        for body in self._regions:
             for point in pybullet.getClosestPoints(
                 self.arm.body, body, _LINKS_WITHIN_M, physicsClientId=self._client
             ):
-                link, on_arm, normal, distance = point[3], point[5], point[7], point[8]
-                if link in self.arm.moving_links:
-                    parting = self.arm.separation_per_joint(
-                        link, np.array(on_arm), np.array(normal), positions
-                    )
-                    near.append(LinkNear(name, distance, parting))
-        return tuple(near)
+                if point[3] in self.arm.moving_links:
+                    yield point[3], body, point[8], np.array(point[5]), np.array(point[7])
 
     def _meeting_links(self, positions: Array) -> Iterator[Touch]:
         for one, other in self.arm.apart:

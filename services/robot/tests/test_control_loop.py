@@ -31,6 +31,7 @@ class Gantry:
 
     name = "gantry"
     joint_names = ("x", "y", "z", "rx", "ry", "rz")
+    links_within = ()
     limits = JointLimits(np.full(6, -10.0), np.full(6, 10.0), np.full(6, 10.0))
 
     def __init__(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 
@@ -14,16 +13,6 @@ from hmcs.task import load_task
 from hmcs_trainer.performance import perform
 from hmcs_trainer.service import Trainer
 from hmcs_trainer.training import train
-
-
-def tell(line: str) -> None:
-    """Tell what is done, for the process that started this one."""
-    print(json.dumps({"detail": line}), flush=True)
-
-
-def tell_fits(done: int, count: int) -> None:
-    """Tell how many of all fits are done."""
-    print(json.dumps({"done": done, "count": count}), flush=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,9 +41,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--find-states", action="store_true", help="find states in the motion, without labels"
     )
     parser.add_argument("--report", help="the page to write on what the model is worth")
-    parser.add_argument(
-        "--tell", action="store_true", help="tell what is done on stdout, a line of JSON each"
-    )
     given = parser.parse_args(words)
     if bool(given.performance) != bool(given.performance_output):
         parser.error("--performance and --performance-output go together")
@@ -67,8 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             recognizer=given.recognizer,
             find_states=given.find_states,
             report=given.report,
-            progress=tell if given.tell else lambda line: print(line, file=sys.stderr),
-            fits=tell_fits if given.tell else lambda _done, _all: None,
+            progress=lambda line: print(line, file=sys.stderr),
         )
         if given.performance:
             perform(

@@ -114,12 +114,12 @@ def _without_slips(source: Source, dead_zone_m: float) -> tuple[Source, list[str
     ]
     if not far:
         return source, []
-    names = {each.name for each in far}
+    kept = set(map(id, far))
     slips = [
         f"{each.name}: moves hardly at all from {each.time_s[0]:.1f} s to {each.time_s[-1]:.1f} s: "
         "left out"
         for each in source.demonstrations
-        if each.name not in names
+        if id(each) not in kept
     ]
     return source._replace(demonstrations=tuple(far)), slips
 

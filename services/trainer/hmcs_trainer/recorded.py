@@ -9,7 +9,7 @@ from hmcs.recordings.inspection import damages, losses_of, unread
 from hmcs.recordings.labels import label_notes
 from hmcs.recordings.reading import RecordingContent
 from hmcs.task import Task
-from hmcs_trainer.validation import Finding
+from hmcs_trainer.plausibility import Finding
 
 _WITH_A_TASK = ("input_device/", "robot/")
 """What the metadata of whoever works on a task begins with."""

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
 from hmcs.motion.lasa import read_drawing
@@ -14,7 +19,13 @@ from hmcs.recordings.parts import SUFFIX as RECORDING
 from hmcs.recordings.reading import RecordingContent, RecordingError, read
 from hmcs.task import Task
 
-_DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d+)(?:-(?P<last>\d+))?")
+DRAWINGS = "lasa:"
+"""What references to drawings begin with."""
+_DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d{1,6})(?:-(?P<last>\d{1,6}))?")
+
+
+class NoMotionError(RecordingError):
+    """A recording in which nobody moved anything; quotes nothing of it."""
 
 
 class Source(NamedTuple):
@@ -25,6 +36,11 @@ class Source(NamedTuple):
     """One at least."""
     recording: RecordingContent | None
     """None where it is no recording."""
+
+
+def is_drawing(reference: str) -> bool:
+    """Return whether a reference names drawings, and no file."""
+    return _DRAWING.fullmatch(reference) is not None
 
 
 def read_references(references: Sequence[str], task: Task) -> list[Demonstration]:
@@ -46,13 +62,64 @@ def read_sources(
     DemonstrationError for a reference that names none, RecordingError for a recording that cannot
     be used.
     """
-    return [_read(reference, task, labels_count) for reference in references]
+    return _told_apart([_read(reference, task, labels_count) for reference in references])
+
+
+def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
+    """Return the sources without demonstrations that are there already, and what was left out.
+
+    A demonstration is another one where its positions or its labels differ, whatever it is called:
+    a file may be named twice, or copied.
+    """
+    kept, told = list[Source](), list[str]()
+    known = dict[bytes, str]()
+    for source in sources:
+        own = []
+        for demonstration in source.demonstrations:
+            content = _digest(demonstration)
+            if content in known:
+                told.append(
+                    f"{demonstration.name}: the same samples as {known[content]}: left out, since "
+                    "it would count twice"
+                )
+            else:
+                known[content] = demonstration.name
+                own.append(demonstration)
+        if own:
+            kept.append(source._replace(demonstrations=tuple(own)))
+    return kept, told
+
+
+def _digest(demonstration: Demonstration) -> bytes:
+    digest = hashlib.sha256(repr(demonstration.states).encode())
+    for array in (demonstration.positions, demonstration.orientations, demonstration.wrenches):
+        digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+    return digest.digest()
+
+
+def _told_apart(sources: list[Source]) -> list[Source]:
+    """Call demonstrations of files of the same name by the whole reference, so that what is told
+    of one is not taken for another's."""
+    bare = Counter(path.name for path in {Path(source.reference) for source in sources})
+    return [
+        source
+        if bare[Path(source.reference).name] == 1 or source.reference.startswith(DRAWINGS)
+        else source._replace(
+            demonstrations=tuple(
+                each._replace(
+                    name=source.reference + each.name.removeprefix(Path(source.reference).name)
+                )
+                for each in source.demonstrations
+            )
+        )
+        for source in sources
+    ]
 
 
 def _read(reference: str, task: Task, labels_count: bool) -> Source:
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
-    if not reference.startswith("lasa:"):
+    if not reference.startswith(DRAWINGS):
         return Source(reference, (read_csv(reference),), None)
     match = _DRAWING.fullmatch(reference)
     if match is None:
@@ -72,7 +139,7 @@ def _recorded(reference: str, labels_count: bool) -> Source:
     found = demonstrations_of(content) if labels_count else performances_of(content)
     if not found:
         moved = labels_count and labels_of(content) and performances_of(content)
-        raise RecordingError(
+        raise NoMotionError(
             f"{reference}: its labels are where the hand did not move: label its motion"
             if moved
             else f"{reference}: there is no motion of a hand in it that held on: hold the dead-man "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from hmcs.recognition.model import Model
+from hmcs.shown import as_figure, as_html
 from hmcs.whole_files import written_whole
 from hmcs_trainer.judging import Judgment
 from hmcs_trainer.validation import Finding
@@ -58,21 +58,25 @@ def write_report(
     found: Sequence[Finding],
 ) -> None:
     """Write the page, whole or not at all; it needs no other file."""
-    told = "".join(f"<li>{html.escape(finding.text)}</li>" for finding in found)
+    told = "".join(map(_item, (finding.text for finding in found)))
     page = _PAGE.substitute(
-        name=html.escape(model.name),
-        facts=html.escape(
+        name=as_html(model.name),
+        facts=as_html(
             f"hash {model.hash}, recognizer {model.recognizer}, task {model.task.name}, "
             f"from {', '.join(model.demonstrations)}"
         ),
-        numbers=html.escape(numbers(judgment)),
-        advice="".join(f"<li>{html.escape(text)}</li>" for text in advice),
+        numbers=as_html(numbers(judgment)),
+        advice="".join(map(_item, advice)),
         findings=f"<h2>About the demonstrations</h2><ul>{told}</ul>" if told else "",
         confusion=_svg(_confusion(model, judgment)),
         guides=_svg(_guides(model)),
     )
     with written_whole(path) as unfinished:
         unfinished.write_text(page, encoding="utf-8")
+
+
+def _item(text: str) -> str:
+    return f"<li>{as_html(text)}</li>"
 
 
 def numbers(judgment: Judgment) -> str:
@@ -94,7 +98,7 @@ def numbers(judgment: Judgment) -> str:
 
 
 def _confusion(model: Model, judgment: Judgment) -> Figure:
-    names, matrix = model.state_names, judgment.confusion
+    names, matrix = list(map(as_figure, model.state_names)), judgment.confusion
     shares = matrix / np.maximum(matrix.sum(axis=1, keepdims=True), 1)
     size = 2.2 + 0.55 * len(names)
     picture = Figure(figsize=(size + 1.5, size), layout="constrained")
@@ -133,7 +137,7 @@ def _guides(model: Model) -> Figure:
         ax.set_aspect("equal", adjustable="datalim")
         ax.set_xlabel(f"{'xyz'[first]}, mm")
         ax.set_ylabel(f"{'xyz'[second]}, mm")
-        ax.set_title(f"{name}: ± {1e3 * float(spread.mean()):.1f} mm", fontsize=10)
+        ax.set_title(f"{as_figure(name)}: ± {1e3 * float(spread.mean()):.1f} mm", fontsize=10)
         ax.grid(color="#e6e6e6", linewidth=0.6)
     return picture
 

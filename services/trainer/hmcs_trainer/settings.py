@@ -14,5 +14,10 @@ class TrainerSettings(ServiceSettings):
 
     folder: Path = Path("out/up/models")
     """Where models and their report pages are written."""
+    sources: tuple[Path, ...] = ()
+    """Folders, or files, beside `folder`, that recordings, CSV files and task files of a question
+    may lie in. Nothing else is read for anybody who asks over the bus."""
+    longest_s: float = Field(default=3600.0, gt=0.0)
+    """A training that takes longer is given up."""
     stop_grace_s: float = Field(default=2.0, gt=0.0)
     """A training that is canceled has so long to end by itself."""

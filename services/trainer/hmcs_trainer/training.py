@@ -8,20 +8,62 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.bus.keys import check_name
+from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import save_model
+from hmcs.recognition.model_file import check_model, save_model
 from hmcs.recognition.recognizers import DEFAULT, kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.selection import choose
-from hmcs.task import load_task
+from hmcs.task import Task, load_task
 from hmcs_trainer.advice import advice
 from hmcs_trainer.finding import check_places, found_states, write_found
 from hmcs_trainer.judging import judged
+from hmcs_trainer.plausibility import Finding, implausible
 from hmcs_trainer.recorded import recording_findings
-from hmcs_trainer.references import read_sources
+from hmcs_trainer.references import Source, distinct, read_sources
 from hmcs_trainer.report import numbers, write_report
-from hmcs_trainer.validation import Finding, findings
+from hmcs_trainer.validation import findings
+
+
+def checked(
+    task: Task, references: Sequence[str], progress: Callable[[str], None]
+) -> tuple[int, int]:
+    """Return how many demonstrations would be learned from, and how many findings were told.
+
+    Raises a UserError as `train` does before it learns anything.
+    """
+    sources, noted = _read(task, references, find_states=False)
+    demonstrations = _shown(sources)
+    noted += findings(task, demonstrations)
+    for finding in noted:
+        if not finding.serious:
+            progress(finding.text)
+    refuse([finding for finding in noted if finding.serious])
+    return len(demonstrations), len(noted)
+
+
+def refuse(serious: Sequence[Finding]) -> None:
+    """Raise LearningError that tells all of these findings; nothing where there is none."""
+    if not serious:
+        return
+    hint = ". With --accept-implausible `hmcs train` learns from it all the same"
+    end = hint if all(finding.may_be_accepted for finding in serious) else ""
+    raise LearningError(
+        "; ".join(finding.text for finding in serious) + end,
+        "; ".join(finding.unquoted or finding.text for finding in serious) + end,
+    )
+
+
+def check_learned(model: Model) -> None:
+    """Raise LearningError for a model that could not be read again: its numbers are none."""
+    try:
+        check_model(model)
+    except ValueError as error:
+        raise LearningError(
+            f"what was learned is no model: {error}; look at the demonstrations and the settings "
+            "of the recognizer"
+        ) from error
 
 
 def train(
@@ -36,6 +78,7 @@ def train(
     seed: int = 0,
     find_states: bool = False,
     report: str | Path | None = None,
+    accept_implausible: bool = False,
     progress: Callable[[str], None] = lambda _: None,
     fits: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Model:
@@ -47,34 +90,30 @@ def train(
     worth: each demonstration, or eight of many, is recognized by a model of the others. What is
     random is drawn with `seed`. With `find_states` gestemes and states are found in the motion,
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
-    as labels beside each recording. Raises a UserError that says what is wrong with the task, a
-    reference, a demonstration, the name, the recognizer or a setting.
+    as labels beside each recording. Demonstrations that no hand made are refused unless
+    `accept_implausible`; those that are given twice count once. Raises a UserError that says what
+    is wrong with the task, a reference, a demonstration, the name, the recognizer or a setting.
     """
     loaded = load_task(task)
     if name is not None:
         check_name("model", name)
     progress("reading demonstrations")
-    sources = read_sources(references, loaded, labels_count=not find_states)
-    noted = [
-        finding
-        for source in sources
-        if source.recording is not None
-        for finding in recording_findings(loaded, source.recording)
-    ]
+    sources, noted = _read(loaded, references, find_states=find_states)
     found, task_file = None, Path(output).with_suffix(".yaml")
     if find_states:
         check_places(sources, task_file)
+        if not accept_implausible:
+            refuse([f for d in _shown(sources) for f in implausible(loaded, d) if f.serious])
         found = found_states(loaded, sources)
         loaded, sources = found.task, list(found.sources)
         noted += [Finding(False, sentence) for sentence in found.told]
-    demonstrations = [each for source in sources for each in source.demonstrations]
+    demonstrations = _shown(sources)
     noted += findings(loaded, demonstrations)
+    refused = [f for f in noted if f.serious and not (accept_implausible and f.may_be_accepted)]
     for finding in noted:
-        if not finding.serious:
+        if finding not in refused:
             progress(finding.text)
-    serious = [finding.text for finding in noted if finding.serious]
-    if serious:
-        raise LearningError("; ".join(serious))
+    refuse(refused)
     if choices:
         selection = choose(
             loaded,
@@ -102,6 +141,7 @@ def train(
     if found is not None:
         for sentence in write_found(found, task_file):
             progress(sentence)
+    check_learned(model)
     saved = save_model(model._replace(name=name or model.name), output)
     if report is not None:
         progress("judging")
@@ -109,3 +149,19 @@ def train(
         write_report(Path(report), saved, left_out, advice(saved, left_out), noted)
         progress(numbers(left_out) if found is None else f"{found.told[0]}; {numbers(left_out)}")
     return saved
+
+
+def _read(
+    task: Task, references: Sequence[str], *, find_states: bool
+) -> tuple[list[Source], list[Finding]]:
+    """What the references name, each demonstration once, and what should be known of it."""
+    sources, doubled = distinct(read_sources(references, task, labels_count=not find_states))
+    noted = [Finding(False, sentence) for sentence in doubled]
+    for source in sources:
+        if source.recording is not None:
+            noted += recording_findings(task, source.recording)
+    return sources, noted
+
+
+def _shown(sources: Sequence[Source]) -> list[Demonstration]:
+    return [each for source in sources for each in source.demonstrations]

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.recognition.disagreement import check_agreement
-from hmcs.recognition.segments import LearningError, Segment, segments_of
+from hmcs.recognition.disagreement import check_agreement, turn_agreement
+from hmcs.recognition.gestemes import LONGEST_WINDOW_STEPS
+from hmcs.recognition.segments import (
+    Array,
+    LearningError,
+    Segment,
+    check_arrays,
+    segments_of,
+)
 from hmcs.task import Task
+from hmcs_trainer.plausibility import Finding, implausible, length_of
+
+__all__ = ["Finding", "findings"]
 
 LEAST_S = 0.5
 """A stretch shorter than this in time is a slip of the pedal."""
@@ -22,32 +31,34 @@ OUTLIER = 4.0
 """Lengths differ by so many times the median difference from the median length, and..."""
 OUTLIER_SHARE = 0.5
 """...by this share of it, at least, to be wild."""
-
-
-class Finding(NamedTuple):
-    """Something to tell whoever gave the demonstrations."""
-
-    serious: bool
-    """Whether nothing can be learned because of it."""
-    text: str
-    """What, where and when, and what to do."""
+OUTLIER_OF_TWO = 2.0
+"""Of two performances, one so many times as long as the other is wild."""
+OTHER_UNITS = 10.0
+"""So many times as long, or as short, is no way of showing the same: its units are others."""
+SLOWER = 1.25
+"""A hand may make so many times the steps that were demonstrated."""
 
 
 def findings(task: Task, demonstrations: Sequence[Demonstration]) -> list[Finding]:
     """Return what is wrong, the serious first; none where all is well."""
-    found = [
-        finding
-        for demonstration in demonstrations
-        for finding in (*_unlabeled(demonstration), *_hasty(demonstration))
-    ]
+    found = list[Finding]()
     try:
+        for demonstration in demonstrations:
+            check_arrays(demonstration)
+            found += implausible(task, demonstration)
+            found += _unlabeled(demonstration)
+            found += _hasty(task, demonstration)
         segments = segments_of(task, demonstrations)
-        check_agreement(task, segments)
+        found += _missing(task, segments)
+        found += _rare(task, segments)
+        found += _wild(task, segments)
+        found += _long(task, segments)
+        found += _unturned(task, segments)
+        if not any(finding.serious for finding in found):
+            # Where hands jump, or units differ, disagreement is a consequence.
+            check_agreement(task, segments)
     except LearningError as error:
-        return [Finding(True, str(error)), *found]
-    found += _missing(task, segments)
-    found += _rare(task, segments)
-    found += _wild(task, segments)
+        found.append(Finding(True, str(error), unquoted=error.unquoted))
     return sorted(found, key=lambda finding: not finding.serious)
 
 
@@ -71,7 +82,8 @@ def _unlabeled(demonstration: Demonstration) -> list[Finding]:
     return found
 
 
-def _hasty(demonstration: Demonstration) -> list[Finding]:
+def _hasty(task: Task, demonstration: Demonstration) -> list[Finding]:
+    states = {state.name for state in task.states}
     return [
         Finding(
             False,
@@ -79,7 +91,9 @@ def _hasty(demonstration: Demonstration) -> list[Finding]:
             f"less than {LEAST_S:g} s: was the pedal pressed twice? Join it to its neighbor",
         )
         for label, samples in demonstration.stretches
-        if label is not None and _lasts_s(demonstration, samples) < LEAST_S
+        if label is not None
+        and label.partition("/")[0] in states
+        and _lasts_s(demonstration, samples) < LEAST_S
     ]
 
 
@@ -126,24 +140,93 @@ def _wild(task: Task, segments: Sequence[Segment]) -> list[Finding]:
     found = []
     for index, gesteme in enumerate(task.gestemes):
         own = [segment for segment in segments if segment.gesteme == index]
-        if len(own) <= FEW:
-            continue
-        lengths = np.array([len(segment.steps) for segment in own]) * task.dead_zone_m
-        usual = float(np.median(lengths))
-        off = np.abs(lengths - usual)
-        limit = max(OUTLIER * float(np.median(off)), OUTLIER_SHARE * usual)
-        for segment, length, apart in zip(own, lengths, off, strict=True):
-            if apart > limit:
-                state = task.states[segment.state].name
-                found.append(
-                    Finding(
-                        False,
-                        f"{segment.demonstration}: {state!r} is {length:.2f} m long, the others of "
-                        f"gesteme {gesteme.name!r} about {usual:.2f} m: leave it out, if it was "
-                        "not meant, or show more like it",
-                    )
+        lengths = np.array([length_of(segment.steps) for segment in own])
+        for k, segment in enumerate(own if len(own) > 1 else ()):
+            others = np.delete(lengths, k)
+            usual = float(np.median(lengths if len(own) > FEW else others))
+            if not _is_wild(float(lengths[k]), lengths, usual):
+                continue
+            ratio = max(float(lengths[k]) / usual, usual / float(lengths[k]))
+            remedy = (
+                "are its units, or those of the others, the right ones? Mend it, or leave it out"
+                if ratio > OTHER_UNITS
+                else "leave it out, if it was not meant, or show more like it"
+            )
+            found.append(
+                Finding(
+                    ratio > OTHER_UNITS,
+                    f"{segment.demonstration}: {task.states[segment.state].name!r} is "
+                    f"{lengths[k]:.2f} m long, the others of gesteme {gesteme.name!r} about "
+                    f"{usual:.2f} m: {remedy}",
+                    may_be_accepted=True,
                 )
+            )
     return found
+
+
+def _is_wild(length: float, lengths: Array, usual: float) -> bool:
+    if len(lengths) <= FEW:
+        return not 1.0 / OUTLIER_OF_TWO < length / usual < OUTLIER_OF_TWO
+    off = np.abs(lengths - usual)
+    return abs(length - usual) > max(OUTLIER * float(np.median(off)), OUTLIER_SHARE * usual)
+
+
+def _long(task: Task, segments: Sequence[Segment]) -> list[Finding]:
+    """Gestemes so long that their beginning is forgotten before they end."""
+    found = []
+    for index, gesteme in enumerate(task.gestemes):
+        own = [segment for segment in segments if segment.gesteme == index]
+        longest = max(own, key=lambda segment: len(segment.steps), default=None)
+        if longest is None or len(longest.steps) * SLOWER <= LONGEST_WINDOW_STEPS:
+            continue
+        steps = len(longest.steps)
+        wanted_m = SLOWER * length_of(longest.steps) / LONGEST_WINDOW_STEPS
+        found.append(
+            Finding(
+                False,
+                f"{longest.demonstration}: gesteme {gesteme.name!r} takes {steps} steps of "
+                f"dead_zone_m ({task.dead_zone_m:g}), and {LONGEST_WINDOW_STEPS} are remembered: "
+                "it is not recognized to its end when performed a little longer; make dead_zone_m "
+                f"{_up(wanted_m):g} or more, or make two gestemes of it",
+            )
+        )
+    return found
+
+
+def _unturned(task: Task, segments: Sequence[Segment]) -> list[Finding]:
+    """Performances whose turns are not learned."""
+    found = []
+    for index, gesteme in enumerate(task.gestemes):
+        own = [segment for segment in segments if segment.gesteme == index]
+        untold = [segment.demonstration for segment in own if segment.orientations is None]
+        if untold and len(untold) < len(own):
+            found.append(
+                Finding(
+                    False,
+                    f"{untold[0]}: it has no orientations, others of gesteme {gesteme.name!r} "
+                    "have: how the hand turns is not learned; record them in all, or in none",
+                )
+            )
+        elif len(own) > 1 and not untold:
+            alike, apart_rad = turn_agreement(own)
+            found += [
+                Finding(
+                    False,
+                    f"{segment.demonstration}: in {task.states[segment.state].name!r} the hand "
+                    f"turns up to {np.degrees(apart_rad[k]):.0f}° otherwise than in "
+                    f"{own[alike[0]].demonstration}: its turns are left out of what is learned; "
+                    "turn the same way round in all, or give them gestemes of their own",
+                )
+                for k, segment in enumerate(own)
+                if k not in alike
+            ]
+    return found
+
+
+def _up(length_m: float) -> float:
+    """Rounded up to two digits."""
+    digit = 10.0 ** (np.floor(np.log10(length_m)) - 1)
+    return float(np.ceil(length_m / digit) * digit)
 
 
 def _lasts_s(demonstration: Demonstration, samples: slice) -> float:

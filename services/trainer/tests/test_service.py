@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,13 +29,16 @@ class Bench:
 
     def __init__(self, stack: Stack, folder: Path) -> None:
         self.stack, self.folder = stack, folder
+        self.takes = folder.parent / "takes"
+        self.takes.mkdir()
         self.told: list[TrainingProgress] = []
         watcher = stack.open_bus("observer", "one")
         watcher.subscribe(
             TrainingProgress, watcher.keys.training, lambda got: self.told.append(got.body)
         )
         bus = stack.open_bus("trainer", "here")
-        self.trainer = Trainer(TrainerSettings(folder=folder), bus, logging.getLogger("test"))
+        settings = TrainerSettings(folder=folder, sources=(self.takes,))
+        self.trainer = Trainer(settings, bus, logging.getLogger("test"))
         self.trainer.start()
 
     def until(self, stage: str) -> TrainingProgress:
@@ -69,9 +73,11 @@ def test_a_model_and_its_page_are_made_and_progress_is_told(bench: Bench) -> Non
 
 
 def test_a_training_that_cannot_succeed_says_why_and_the_next_one_may(bench: Bench) -> None:
-    bench.trainer._train(ASKED.model_copy(update={"demonstrations": ("none.csv",)}))
+    (bench.takes / "empty.csv").write_text("time_s,x_m,y_m,state\n0,0,0,secret\n")
+    bench.trainer._train(ASKED.model_copy(update={"demonstrations": ("empty.csv",)}))
     failed = bench.until("failed")
-    assert "none.csv" in failed.detail
+    assert "empty.csv: cannot be read: `hmcs task check`" in failed.detail
+    assert not any("secret" in told.detail for told in bench.told)
     assert list(bench.folder.iterdir()) == []
     bench.trainer._train(ASKED)
     bench.until("learning")
@@ -109,7 +115,7 @@ def test_states_are_found_when_asked_for(bench: Bench) -> None:
     files = []
     for seed in (1, 2):
         wander = np.random.default_rng(seed).normal(scale=4e-4, size=lines.shape).cumsum(axis=0)
-        files.append(str(bench.folder.parent / f"take-{seed}.csv"))
+        files.append(str(bench.takes / f"take-{seed}.csv"))
         shown = Demonstration("shown", time_s, lines + wander, (None,) * len(time_s))
         write_csv(files[-1], shown)
     asked = Train(
@@ -122,3 +128,67 @@ def test_states_are_found_when_asked_for(bench: Bench) -> None:
     done = bench.until("done")
     assert "4 states of 4 gestemes found in 2 demonstrations" in done.detail
     assert load_task(bench.folder / "found.yaml") == load_model(done.path).task
+
+
+def test_a_hidden_file_is_neither_read_nor_told_to_be_there(bench: Bench, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.csv"
+    secret.write_text("root:x:0:0:root:/root:/bin/bash\n")
+    (bench.takes / "link.csv").symlink_to(secret)
+    reasons = []
+    for name in (
+        str(secret),
+        "../secret.csv",
+        "link.csv",
+        str(bench.takes / ".." / "secret.csv"),
+        str(tmp_path / "nowhere.csv"),
+    ):
+        with pytest.raises(RequestRefusedError) as caught:
+            bench.trainer._train(ASKED.model_copy(update={"demonstrations": (name,)}))
+        reasons.append(str(caught.value).replace(repr(name), "it"))
+    assert len(set(reasons)) == 1
+    assert "is no file in the trainer's folders" in reasons[0]
+    assert bench.told == []
+
+
+def test_a_training_that_takes_too_long_is_given_up_and_the_next_one_may(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hangs = (sys.executable, "-c", "import time; time.sleep(1000)")
+    with monkeypatch.context() as patched:
+        patched.setattr("hmcs_trainer.running._COMMAND", hangs)
+        patched.setattr(
+            bench.trainer, "settings", bench.trainer.settings.model_copy(update={"longest_s": 0.5})
+        )
+        bench.trainer._train(ASKED)
+        assert "longer than 0.5 s" in bench.until("failed").detail
+    bench.trainer._train(ASKED)
+    bench.until("learning")
+
+
+def test_a_training_whose_process_dies_is_told_and_quotes_nothing(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dies = (sys.executable, "-c", "raise SystemExit('root:x:0:0')")
+    monkeypatch.setattr("hmcs_trainer.running._COMMAND", dies)
+    bench.trainer._train(ASKED)
+    detail = bench.until("failed").detail
+    assert "ended with 1" in detail
+    assert "root" not in detail
+
+
+def test_what_strangers_tell_takes_no_memory_and_is_forgotten(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hmcs_trainer.service.MOST_ELSEWHERE", 2)
+    for number in range(4):
+        stranger = bench.stack.open_bus("trainer", f"stranger-{number}")
+        stranger.publisher(TrainingProgress, stranger.keys.training).put(
+            TrainingProgress(model="mine", stage="learning", detail="", share=0.0)
+        )
+    bench.stack.until(lambda: len(bench.told) == 4)
+    bench.stack.until(lambda: "stranger-3" in bench.trainer._elsewhere)
+    assert len(bench.trainer._elsewhere) <= 2
+    with pytest.raises(RequestRefusedError, match="by trainer stranger"):
+        bench.trainer._train(ASKED)
+    monkeypatch.setattr("hmcs_trainer.service.FORGOTTEN_AFTER_S", 0.0)
+    assert "training mine" in bench.trainer._train(ASKED).detail

@@ -16,6 +16,7 @@ import zenoh
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from hmcs.bus.keys import check_name
+from hmcs.errors import UserError
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 LEASE_MS = 1000
@@ -136,18 +137,23 @@ def check_tls(settings: TlsSettings) -> None:
 
 
 def opens_to_network(endpoint: str) -> bool:
-    """Return whether who listens on `endpoint` can be reached from other hosts without TLS.
+    """Return whether who listens on `endpoint` can be reached from other hosts without TLS."""
+    return endpoint.partition("/")[0] not in _ENCRYPTED and not on_this_machine(endpoint)
 
-    A name other than `localhost` counts as one that can: what it stands for may change.
+
+def on_this_machine(endpoint: str) -> bool:
+    """Return whether only processes of this machine reach `endpoint`.
+
+    No name but `localhost` counts as this machine: what it stands for may change.
     """
     protocol, _, rest = endpoint.partition("/")
-    if protocol in _ENCRYPTED or protocol in _WITHIN_THIS_MACHINE:
-        return False
+    if protocol in _WITHIN_THIS_MACHINE:
+        return True
     host = re.split(r"[?#]", rest)[0].rpartition(":")[0].removeprefix("[").removesuffix("]")
     try:
-        return not ipaddress.ip_address(host).is_loopback
+        return ipaddress.ip_address(host).is_loopback
     except ValueError:
-        return host != "localhost"
+        return host == "localhost"
 
 
 def client_config(settings: BusSettings) -> zenoh.Config:
@@ -155,7 +161,16 @@ def client_config(settings: BusSettings) -> zenoh.Config:
 
     The attempt ends at once where nobody listens, and after `OPENING_MS` where nobody answers. Once
     open the session reconnects by itself for ever, 50 to 250 ms apart.
+    Raises UserError for a direct process that others would not hear: a router does not pass on what
+    direct processes say to each other.
     """
+    if settings.direct and not (settings.open_to_network or on_this_machine(settings.router)):
+        raise UserError(
+            f"direct: the router {settings.router} is not on this machine, and direct processes on "
+            "other hosts do not reach this one: say that they may, by "
+            f"{OPEN_TO_NETWORK} (everybody who reaches its port can move the robot), or leave "
+            "direct out"
+        )
     config: dict[str, Any] = {
         "mode": "peer" if settings.direct else "client",
         "connect": {

@@ -21,8 +21,9 @@ from pydantic import ValidationError
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.bus.keys import ANY, KeyNameError, Member
 from hmcs.bus.messages import Ask, Health
-from hmcs.bus.presence import present
-from hmcs.bus.session import Bus, BusSettings, BusUnavailableError, RequestRefusedError
+from hmcs.bus.presence import possible, present
+from hmcs.bus.session import Answer, Bus, BusSettings, BusUnavailableError, RequestRefusedError
+from hmcs.bus.verbs import HEALTH
 from hmcs.shown import plain
 
 ROUTER = "router"
@@ -54,15 +55,25 @@ def _problem(arguments: argparse.Namespace) -> str | None:
             if arguments.service == ROUTER:
                 return None
             keys = bus.keys
-            key = keys.rpc(arguments.service, arguments.instance, "health")
-            tokens = bus.alive(keys.presence(arguments.service, arguments.instance))
-            answers = bus.ask(key, Ask(), Health, arguments.timeout)
+            asked = Member(arguments.service, arguments.instance)
+            tokens = bus.alive(keys.presence(*asked))
+            answers = HEALTH.ask(
+                bus,
+                Ask(),
+                service=asked.service,
+                instance=asked.instance,
+                timeout_s=arguments.timeout,
+            )
     except BusUnavailableError as error:
         return str(error)
     except RequestRefusedError as error:
         return f"could not say how it is: {error}"
     within = f"within {arguments.timeout:g} s (router {settings.router})"
-    told = {Member(a.envelope.source.service, a.envelope.source.instance): a.body for a in answers}
+    told = {
+        member: answer.body
+        for answer in answers
+        if possible(member := _sender(answer)) and member.service == arguments.service
+    }
     problems = [
         *(
             f"{member.instance}: is present, but did not answer {within}"
@@ -70,14 +81,18 @@ def _problem(arguments: argparse.Namespace) -> str | None:
             if member not in told
         ),
         *(
-            f"{plain(member.instance)}: {plain(health.detail)}"
+            f"{member.instance}: {plain(health.detail)}"
             for member, health in sorted(told.items(), key=itemgetter(0))
             if not health.healthy
         ),
     ]
     if not told and not problems:
-        return f"nobody answered on {key} {within}"
+        return f"nobody answered on {keys.rpc(*asked, HEALTH.name)} {within}"
     return "; ".join(problems) or None
+
+
+def _sender(answer: Answer[Health]) -> Member:
+    return Member(answer.envelope.source.service, answer.envelope.source.instance)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -14,6 +14,8 @@ from hmcs.bus.messages import Envelope, Message
 
 M = TypeVar("M", bound=Message)
 
+QUOTED_LETTERS = 300
+"""How much of what a sender wrote stands in the reason of a refusal."""
 _SMALL_BYTES = 4096
 """In so few bytes there is no room for elements enough to cost time."""
 
@@ -67,8 +69,9 @@ def decode(data: bytes, expected: type[M]) -> tuple[Envelope, M]:
         return Envelope.model_validate(fields), expected.model_validate(fields, context=FROM_WIRE)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"]) or "message"
-        raise RefusedMessageError(f"{schema}: {where}: {first['msg']}") from error
+        where = ".".join(str(part)[:64] for part in first["loc"]) or "message"
+        # Whatever the sender wrote stands in it.
+        raise RefusedMessageError(f"{schema}: {where}: {first['msg'][:QUOTED_LETTERS]}") from error
 
 
 def envelope_of(data: bytes, expected: type[Message]) -> Envelope | None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from hmcs.motion.paths import resample
+from hmcs.motion.turns import mean_turns
 from hmcs.recognition.segments import Array, LearningError, Segment
 from hmcs.task import Task
 
@@ -14,6 +16,11 @@ POINTS = 32
 LARGEST_DISAGREEMENT = 0.8
 """Of shapes of extent one, begun at one place; straight lines at 90° have it, opposite ones 1.15.
 Drawings of one way in the LASA collection are no farther than 0.2 from each other."""
+
+LARGEST_TURN_APART_RAD = np.pi / 2
+"""Between performances, on the way: the mean of two such turns is half a right angle off from both.
+Turns count as they were made: half a turn to the left is a whole one apart from half a turn to the
+right."""
 
 
 def check_agreement(task: Task, segments: Sequence[Segment]) -> None:
@@ -41,6 +48,34 @@ def check_agreement(task: Task, segments: Sequence[Segment]) -> None:
             f"{own[other].demonstration!r}. Leave out what was not meant, show each way twice, or "
             "give them gestemes of their own"
         )
+
+
+class TurnAgreement(NamedTuple):
+    """Which performances of a gesteme turn the hand alike."""
+
+    alike: tuple[int, ...]
+    """Indices of the performances that agree with the one most agree with; the first of those."""
+    apart_rad: Array
+    """How far each performance is apart from that one, at most on the way, shape (n,)."""
+
+
+def turn_agreement(segments: Sequence[Segment]) -> TurnAgreement:
+    """Return which performances of one gesteme turn the hand alike; all of them tell how it turns.
+
+    Two ways round have no mean that is one of them, even where both end in the same orientation.
+    """
+    turns = np.stack(
+        [
+            mean_turns([segment.positions], [segment.orientations], POINTS)
+            for segment in segments
+            if segment.orientations is not None
+        ]
+    )
+    cosine = np.clip(np.einsum("akq,bkq->abk", turns, turns), -1.0, 1.0)
+    apart_rad = 2.0 * np.arccos(cosine).max(axis=2)
+    close = apart_rad <= LARGEST_TURN_APART_RAD
+    chosen = int(close.sum(axis=1).argmax())
+    return TurnAgreement(tuple(np.flatnonzero(close[chosen]).tolist()), apart_rad[chosen])
 
 
 def _distances(motions: Sequence[Array]) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import mean_path
 from hmcs.motion.turns import mean_turns
+from hmcs.recognition.disagreement import turn_agreement
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizers import DEFAULT, Lesson, kind_named
 from hmcs.recognition.segments import Array, LearningError, Segment, segments_of
@@ -70,8 +71,12 @@ def learn(
 
 
 def _turns(segments: Sequence[Segment]) -> Array | None:
-    """How the hand turns along a gesteme's path, (K, 4); None unless every performance tells."""
-    orientations = [s.orientations for s in segments if s.orientations is not None]
-    if len(orientations) < len(segments):
+    """How the hand turns along a gesteme's path, (K, 4); None unless every performance tells.
+
+    The mean of those that turn it alike: of two ways round the one that more performances take.
+    """
+    if any(segment.orientations is None for segment in segments):
         return None
-    return mean_turns([segment.positions for segment in segments], orientations)
+    alike = [segments[k] for k in turn_agreement(segments).alike]
+    orientations = [s.orientations for s in alike if s.orientations is not None]
+    return mean_turns([segment.positions for segment in alike], orientations)

@@ -17,9 +17,17 @@ from hmcs.task import Task
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+_LONGEST_LABEL = 64
+"""So much of a label is told: no name of a state is longer."""
+
 
 class LearningError(UserError):
     """Demonstrations that a model cannot be learned from; says which, why, and what to do."""
+
+    def __init__(self, message: str, unquoted: str | None = None) -> None:
+        super().__init__(message)
+        self.unquoted = message if unquoted is None else unquoted
+        """The message without what a file said instead of a name of the task."""
 
 
 class Segment(NamedTuple):
@@ -92,7 +100,7 @@ def segments_of(task: Task, demonstrations: Sequence[Demonstration]) -> list[Seg
         raise LearningError(f"no demonstrations of task {task.name!r}: give at least one")
     segments: list[Segment] = []
     for index, demonstration in enumerate(demonstrations):
-        _check(demonstration)
+        check_arrays(demonstration)
         labeled, own, last = False, list[Segment](), -1
         for label, samples in demonstration.stretches:
             if label is None:
@@ -164,32 +172,31 @@ def _row(values: Array | None, k: int) -> Array | None:
 
 def _meant(task: Task, label: str, demonstration: Demonstration, sample: int) -> tuple[int, int]:
     """State and gesteme that the label of a sample names."""
-    where = (
-        f"demonstration {demonstration.name!r}: label {label!r} "
-        f"at {demonstration.time_s[sample]:.2f} s"
-    )
+    told = label[:_LONGEST_LABEL]
+    quoted = f"demonstration {demonstration.name!r}: label {told!r}"
+    unquoted = f"demonstration {demonstration.name!r}: its label"
+    at = f"at {demonstration.time_s[sample]:.2f} s"
     state_name, _, chosen = label.partition("/")
     names = [state.name for state in task.states]
     if state_name not in names:
-        near = get_close_matches(state_name, names, n=1)
+        near = get_close_matches(state_name[:_LONGEST_LABEL], names, n=1)
         guess = f", did you mean {near[0]!r}?" if near else ""
-        raise LearningError(
-            f"{where} is no state of task {task.name!r}{guess} (states are {', '.join(names)})"
-        )
+        wrong = f"{at} is no state of task {task.name!r}{guess} (states are {', '.join(names)})"
+        raise LearningError(f"{quoted} {wrong}", f"{unquoted} {wrong}")
     index = names.index(state_name)
     state = task.states[index]
     if not chosen and len(state.gestemes) == 1:
         chosen = state.gestemes[0]
     if chosen not in state.gestemes:
-        raise LearningError(
-            f"{where} does not name one of the gestemes of state {state_name!r}; write "
-            + " or ".join(f"{state_name}/{name}" for name in state.gestemes)
-        )
+        choices = " or ".join(f"{state_name}/{name}" for name in state.gestemes)
+        wrong = f"{at} does not name one of the gestemes of state {state_name!r}; write {choices}"
+        raise LearningError(f"{quoted} {wrong}", f"{unquoted} {wrong}")
     return index, [gesteme.name for gesteme in task.gestemes].index(chosen)
 
 
-def _check(demonstration: Demonstration) -> None:
-    """Refuse arrays that no file could have held; files are checked as they are read."""
+def check_arrays(demonstration: Demonstration) -> None:
+    """Raise LearningError for arrays that no file could have held; those of files are checked as
+    they are read."""
     name, samples = demonstration.name, len(demonstration.positions)
     expected = {
         "time_s": (samples,),

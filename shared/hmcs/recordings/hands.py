@@ -1,7 +1,9 @@
 """Whose samples count where several input devices are in a recording: the hand's that drives.
 
 One hand drives at a time. It is the one that engaged first, until it lets go of the dead-man or is
-silent for `SILENT_AFTER_S`; what others do meanwhile changes nothing.
+silent for as long as lets another drive a robot; what others do meanwhile changes nothing. A robot
+may not have followed it: which one it follows is decided more strictly, see `hmcs.driving`. What
+the hand did is a demonstration all the same.
 """
 
 from __future__ import annotations
@@ -10,11 +12,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from hmcs.bus.messages import Motion
+from hmcs.driving import TAKEOVER_S
 from hmcs.recordings.reading import RecordingContent
 
-SILENT_AFTER_S = 0.5
-"""A device of 30 Hz that misses fifteen samples is gone."""
-_SILENT_AFTER_NS = round(SILENT_AFTER_S * 1e9)
+_SILENT_AFTER_NS = round(TAKEOVER_S * 1e9)
 
 
 class Sample(NamedTuple):
@@ -24,6 +25,8 @@ class Sample(NamedTuple):
     device: str
     """Its boot."""
     motion: Motion
+    captured_ns: int
+    """When it was taken, by the recorder's clock."""
 
     @property
     def engaged(self) -> bool:
@@ -50,4 +53,4 @@ def hand_of(content: RecordingContent) -> Iterator[Sample]:
             drives = ""
         else:
             continue
-        yield Sample(recorded.log_ns, device, motion)
+        yield Sample(recorded.log_ns, device, motion, recorded.captured_ns)

@@ -17,10 +17,6 @@ from hmcs.recordings.scan import LATEST_NS, Block, Scan, records_of, why_passed_
 MOST_OVERLAPPING_BYTES = 64 * 1024 * 1024
 """Of parts of a file whose times overlap: they are held at once while they are put in order. Those
 of writers that mix several sources have some megabytes."""
-WRITTEN_AS_IT_CAME = "hmcs "
-"""Begins the name of the library that writes messages in the order in which they came. It notes the
-steps made before a recording ahead of what came while it asked for them, whose times are earlier.
-"""
 
 
 class RecordingError(UserError):
@@ -41,7 +37,7 @@ def found_in(file: RecordFile, scan: Scan, channels: Set[int], types: int) -> It
     own readers do; those of one time as they stand in the file. Raises RecordingError where more
     than MOST_OVERLAPPING_BYTES would have to be held, and where the file changed since the scan.
     """
-    if scan.in_order or scan.library.startswith(WRITTEN_AS_IT_CAME):
+    if scan.as_it_stands:
         for block in scan.blocks(types):
             data = _records_of(file, block)
             for message in _usable(scan, channels, data):

@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 from hmcs.bus.counters import Sequences
 from hmcs.bus.messages import Envelope, Message
-from hmcs.bus.wire import schema_of
 from hmcs.recordings.gaps import Gap
-from hmcs.recordings.plain import BY_SCHEMA, NoMessageError, envelope_of, message_of
+from hmcs.recordings.plain import NoMessageError, envelope_of, message_of, readable_as
 from hmcs.recordings.reading import MODEL_SUFFIX, Recorded, RecordingContent
 
 
@@ -77,7 +76,7 @@ def inspected(content: RecordingContent) -> Inspection:
 def damages(content: RecordingContent) -> Iterator[str]:
     """Yield what is missing in a recording since its file is damaged or was not ended."""
     for gap in content.gaps:
-        yield f"{_when(gap, content.first_ns)} something is missing: {gap.why}"
+        yield f"{_when(gap, content)} something is missing: {gap.why}"
     if content.gaps and content.lost:
         yield f"{content.lost} messages are missing in all, by the index of the file"
     if not content.whole:
@@ -89,7 +88,8 @@ def damages(content: RecordingContent) -> Iterator[str]:
 def unread(content: RecordingContent, *message_types: type[Message]) -> tuple[str, ...]:
     """Return what `content.of` passes over of some types, a sentence for each key."""
     unreadable = _Unreadable()
-    for message in content.messages.of_schemas([schema_of(each) for each in message_types]):
+    schemas = [schema for schema in content.schemas if readable_as(schema) in message_types]
+    for message in content.messages.of_schemas(schemas):
         unreadable.note(message.key, _read(message).why)
     return tuple(unreadable.told())
 
@@ -101,7 +101,7 @@ class _Read(NamedTuple):
 
 
 def _read(message: Recorded) -> _Read:
-    message_type = BY_SCHEMA.get(message.schema)
+    message_type = readable_as(message.schema)
     try:
         if message_type is None:
             return _Read(envelope_of(message.text), "")
@@ -155,9 +155,9 @@ def _lost(sequences: Sequences, message: Recorded, envelope: Envelope | None) ->
     return sequences.note(message.key, envelope.source.boot, envelope.seq) or 0
 
 
-def _when(gap: Gap, first_ns: int) -> str:
+def _when(gap: Gap, content: RecordingContent) -> str:
     begin, end = (
-        None if at is None else f"{(at - first_ns) / 1e9:.3f} s"
+        None if at is None or not content.messages else f"{(at - content.first_ns) / 1e9:.3f} s"
         for at in (gap.begin_ns, gap.end_ns)
     )
     if begin is None:
@@ -174,7 +174,7 @@ def _problems(content: RecordingContent, channels: tuple[ChannelSummary, ...]) -
         if channel.lost:
             yield f"{channel.lost} messages are missing on {channel.key}"
     version = content.metadata.get("hmcs", {}).get("version", "unknown")
-    for schema in sorted(content.schemas.keys() - BY_SCHEMA.keys()):
+    for schema in sorted(each for each in content.schemas if readable_as(each) is None):
         yield (
             f"{schema} cannot be read: it is of another version of the contract; replay and train "
             f"with version {version} of hmcs, which recorded it"

@@ -132,13 +132,15 @@ def _moved_aside(content: RecordingContent) -> Path | None:
 def _check_times(content: RecordingContent, written: LabelFile) -> None:
     """Raise RecordingError where labels were written in another unit, or are of no part of it."""
     file = labels_beside(content.path)
-    unit = misread_unit(written.stretches, content.first_ns, content.last_ns)
+    all_there = content.whole and not content.gaps
+    last_ns = content.last_ns if all_there else None
+    unit = misread_unit(written.stretches, content.first_ns, last_ns)
     if unit:
         raise RecordingError(
             f"{file}: the recording lasts {content.duration_s:.3f} s, and the times of these "
             f"labels read like {unit}"
         )
-    if not content.whole or content.gaps:
+    if not all_there:
         # What they are of may be among what is missing.
         return
     for stretch, line in zip(written.stretches, written.lines, strict=True):

@@ -74,9 +74,9 @@ class Recording:
         return self._file.path
 
     @property
-    def nameless(self) -> frozenset[str]:
-        """Robots in it whose joints nobody has named; see `name_joints`."""
-        return frozenset(self._showing.nameless)
+    def undescribed(self) -> frozenset[str]:
+        """Robots in it of which nobody said how they look; see `name_joints`."""
+        return frozenset(self._showing.undescribed)
 
     def write(self, key: str, fields: Fields, log_ns: int, captured_ns: int | None) -> None:
         """Add a message by its fields, as `fields_of` gives them.

@@ -12,7 +12,8 @@ import msgpack
 import numpy as np
 from pydantic import ValidationError
 
-from hmcs.bus.messages import MESSAGES, Envelope, Message
+from hmcs.bus.bounds import MOST_FIELDS
+from hmcs.bus.messages import MESSAGES, Envelope, Message, RobotState
 from hmcs.bus.schemas import wire_schema
 from hmcs.bus.wire import RefusedMessageError, decode, schema_of
 
@@ -22,8 +23,8 @@ Fields = dict[str, Any]
 
 BY_SCHEMA: dict[str, type[Message]] = {schema_of(message): message for message in MESSAGES}
 """Every message of this version of the contract by its name on the wire."""
-MOST_FIELDS = 1000
-"""Of a message, ahead of that which says its type; those of the contract have twenty."""
+OLDER: dict[str, type[Message]] = {"robot_state/2": RobotState}
+"""Messages of earlier versions that are read as those of today: what was added may be left out."""
 
 
 class NoMessageError(ValueError):
@@ -56,6 +57,11 @@ def json_fields(text: str | bytes) -> Fields:
     if not isinstance(fields, dict):
         raise NoMessageError(f"a {type(fields).__name__}, expected an object of fields")
     return fields
+
+
+def readable_as(schema: str) -> type[Message] | None:
+    """Return the message type that messages of a schema in a recording are read as, if any."""
+    return BY_SCHEMA.get(schema) or OLDER.get(schema)
 
 
 def envelope_of(text: str | bytes) -> Envelope:

@@ -22,7 +22,7 @@ from hmcs.bus.wire import schema_of
 from hmcs.recordings.gaps import Gap
 from hmcs.recordings.in_order import RecordingError, found_in
 from hmcs.recordings.mcap_records import MAGIC, RecordFile
-from hmcs.recordings.plain import Fields, NoMessageError, json_fields, message_of
+from hmcs.recordings.plain import Fields, NoMessageError, json_fields, message_of, readable_as
 from hmcs.recordings.scan import Scan
 from hmcs.recordings.scanning import scanned
 
@@ -182,8 +182,12 @@ class RecordingContent:
         self, *message_types: type[BusMessage]
     ) -> Iterator[tuple[Recorded, Envelope, BusMessage]]:
         """Yield the messages of several types in the order they came; raises as `of` does."""
-        types = {schema_of(message_type): message_type for message_type in message_types}
-        self._check_versions(types)
+        types = {
+            schema: message_type
+            for schema in self.schemas
+            if (message_type := readable_as(schema)) in message_types and message_type is not None
+        }
+        self._check_versions(types, message_types)
         for recorded in self.messages.of_schemas(tuple(types)):
             try:
                 envelope, message = message_of(types[recorded.schema], recorded.text)
@@ -191,11 +195,13 @@ class RecordingContent:
                 continue
             yield recorded, envelope, message
 
-    def _check_versions(self, types: Mapping[str, type[BusMessage]]) -> None:
-        wanted = {message_type.SCHEMA: schema for schema, message_type in types.items()}
+    def _check_versions(
+        self, types: Mapping[str, type[BusMessage]], message_types: Sequence[type[BusMessage]]
+    ) -> None:
+        wanted = {message_type.SCHEMA: schema_of(message_type) for message_type in message_types}
         for schema in self.schemas:
             expected = wanted.get(schema.partition("/")[0])
-            if expected is not None and schema != expected:
+            if expected is not None and schema not in types:
                 raise RecordingError(
                     f"{self.path}: has {schema}, expected {expected}: it was recorded "
                     f"with version {self.metadata.get('hmcs', {}).get('version', 'unknown')} of "

@@ -27,6 +27,10 @@ MOST_BLOCKS = 1_000_000
 does, so many last six days."""
 LONGEST_NAME_BYTES = 4096
 """Of an attachment; no file system has longer ones."""
+WRITTEN_AS_IT_CAME = "hmcs "
+"""Begins the name of the library that writes messages in the order in which they came. It notes the
+steps made before a recording ahead of what came while it asked for them, whose times are earlier.
+"""
 _MOST_BITS = 62
 
 
@@ -75,7 +79,7 @@ class Scan:
     lost: int = 0
     """Messages of the contract that its index counts and that were not found."""
     first_ns: int = 0
-    """Log time of the first message of the contract, as they stand in the file."""
+    """Log time of the first message of the contract, in the order they are read."""
     last_ns: int = 0
     """The latest one."""
     in_order: bool = True
@@ -84,6 +88,11 @@ class Scan:
         default_factory=lambda: tuple(array("Q") for _ in Block._fields)
     )
     _bits: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def as_it_stands(self) -> bool:
+        """Whether messages are read in the order in which they stand in the file."""
+        return self.in_order or self.library.startswith(WRITTEN_AS_IT_CAME)
 
     def blocks(self, types: int, *, by_time: bool = False) -> Iterator[Block]:
         """Yield the parts of the file with messages of some types, as they stand in it.

@@ -77,7 +77,7 @@ class _Scanner:
         self._seen: Counter[int] = Counter()
         """Messages of the contract by channel, those passed over as well."""
         self._left_bytes = size * MOST_EXPANSION + EXPANSION_SLACK_BYTES
-        self._last_ns = 0
+        self._last_ns = self._earliest_ns = 0
         self._undescribed = _Span()
         self._loose: Block | None = None
 
@@ -105,6 +105,8 @@ class _Scanner:
             for number, count in ({} if index is None else index.counts).items()
             if (channel := self._channel(number)) is not None and channel.of_contract
         )
+        if not scan.as_it_stands:
+            scan.first_ns = min(scan.first_ns, self._earliest_ns)
         scan.gaps = tuple(self._all_gaps())
         return scan
 
@@ -154,7 +156,7 @@ class _Scanner:
 
     def _unpacked(self, chunk: Chunk) -> bytes:
         size = chunk.unpacked_bytes
-        if size > self._left_bytes:
+        if LARGEST_CHUNK_BYTES >= size > self._left_bytes:
             raise DamageError(f"more than {MOST_EXPANSION} times what the file has, unpacked")
         # What cannot be unpacked may have been as long in the making as it says it is large.
         self._left_bytes -= size
@@ -217,13 +219,14 @@ class _Scanner:
             scan.passed_over[channel.topic, why] += 1
             return 0
         if not scan.counts:
-            scan.last_ns = self._last_ns = log_ns
+            scan.last_ns = self._last_ns = self._earliest_ns = log_ns
             # What is said in seconds since then stays true though the first chunk is damaged.
             begins = (gap.begin_ns or log_ns for gap in self._gaps)
             scan.first_ns = min([log_ns, *(at for at in begins if at > log_ns - _DAY_NS)])
         scan.in_order = scan.in_order and log_ns >= self._last_ns
         scan.counts[message.channel] += 1
         scan.last_ns = max(scan.last_ns, log_ns)
+        self._earliest_ns = min(self._earliest_ns, log_ns)
         self._last_ns = log_ns
         self._gaps.read(log_ns)
         return scan.bit(channel.message_type)

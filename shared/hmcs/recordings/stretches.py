@@ -104,20 +104,22 @@ def ends_after(stretch: Stretch, last_ns: int) -> bool:
     return stretch.end_ns > last_ns + _SLACK_NS
 
 
-def misread_unit(stretches: Sequence[Stretch], first_ns: int, last_ns: int) -> str:
+def misread_unit(stretches: Sequence[Stretch], first_ns: int, last_ns: int | None) -> str:
     """Return in which unit the times of stretches seem to have been written instead of seconds.
 
-    With what to do about it; empty where they are of a recording from `first_ns` to `last_ns`, or
-    nobody can tell.
+    With what to do about it; empty where they can be of a recording from `first_ns` to `last_ns`,
+    or nobody can tell. `last_ns` is None where its end is not known.
     """
     latest_s = max((stretch.end_ns - first_ns for stretch in stretches), default=0) / NS_PER_S
-    lasts_s = (last_ns - first_ns) / NS_PER_S
     for unit, in_second in _UNITS:
         if _SINCE_1970_S[0] <= latest_s / in_second <= _SINCE_1970_S[1]:
             return (
                 f"{unit} since 1970: write seconds since the recording began, which was "
                 f"{first_ns / NS_PER_S:.3f} s since then"
             )
+    if last_ns is None:
+        return ""
+    lasts_s = (last_ns - first_ns) / NS_PER_S
     for unit, in_second in _UNITS[1:]:
         if (
             latest_s > 2 * lasts_s

@@ -26,8 +26,8 @@ TRAIL_EVERY_NS = 100_000_000
 TRAIL_TOLD_NS = 1_000_000_000
 """...and is written as a whole once in such a time."""
 
-MOST_NAMELESS = 16
-"""So many robots are followed whose joints nobody has named."""
+MOST_UNDESCRIBED = 16
+"""So many robots are noted of which nobody said how they look."""
 
 _TIME = {
     "type": "object",
@@ -83,14 +83,14 @@ class Showing:
         self._grown_ns = self._told_ns = -TRAIL_TOLD_NS
         self._shown_ns: dict[str, int] = {}
         self._joints: dict[str, tuple[str, ...]] = {}
-        self.nameless: set[str] = set()
-        """Robots whose joints nobody has named as their description does. They are not shown: a
-        viewer moves a robot's model by those names alone."""
+        self.undescribed: set[str] = set()
+        """Robots of which nobody said how they look. Joints that no state names either are not
+        shown: a viewer moves a robot's model by the names in its description alone."""
 
     def name_joints(self, robot: str, joints: tuple[str, ...]) -> None:
         """Note what a robot's description calls its joints, in the order of their positions."""
         self._joints[robot] = joints
-        self.nameless.discard(robot)
+        self.undescribed.discard(robot)
 
     def of(self, fields: dict[str, Any], log_ns: int) -> Iterator[Shown]:
         """Yield what is to be shown of a message, by its fields as `fields_of` gives them."""
@@ -118,12 +118,12 @@ class Showing:
             yield Shown(f"{PREFIX}trail", "foxglove.PosesInFrame", trail)
 
     def _joint_states(self, fields: dict[str, Any], log_ns: int) -> dict[str, Any]:
-        """Its joints as far as anybody named them."""
+        """Its joints, where the state or somebody else names them."""
         robot, positions = fields["robot"], fields["joint_positions"]
         velocities = fields["joint_velocities"]
-        if robot not in self._joints and len(self.nameless) < MOST_NAMELESS:
-            self.nameless.add(robot)
-        names = self._joints.get(robot, ())
+        names = fields.get("joint_names") or self._joints.get(robot, ())
+        if robot not in self._joints and len(self.undescribed) < MOST_UNDESCRIBED:
+            self.undescribed.add(robot)
         if not len(names) == len(positions) == len(velocities):
             names = ()
         joints = [

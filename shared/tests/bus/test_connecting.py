@@ -16,6 +16,7 @@ import zenoh
 from hmcs.bus import connecting
 from hmcs.bus.config import BusSettings
 from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
+from hmcs.errors import UserError
 
 LOG = logging.getLogger("hmcs.test")
 
@@ -72,6 +73,21 @@ def silent() -> Iterator[str]:
     """An endpoint that accepts connections and never says a word."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
+@pytest.mark.parametrize("router", ["tcp/192.0.2.1:7447", "tls/robot.lan:7447", "tcp/router:7447"])
+def test_a_direct_process_that_others_would_not_hear_is_told_so(router) -> None:
+    settings = BusSettings(router=router, direct=True)
+    with pytest.raises(UserError, match=r"do not reach this one.*--open-to-network"):
+        connect(settings, LOG, lambda: False)
+
+
+def test_a_direct_process_that_may_be_reached_looks_for_a_router_elsewhere() -> None:
+    settings = BusSettings(
+        router="tcp/192.0.2.1:7447", direct=True, open_to_network=True, connect_timeout_s=0.1
+    )
+    with pytest.raises(BusUnavailableError):
+        connect(settings, LOG, lambda: False)
 
 
 def attempts() -> list[threading.Thread]:

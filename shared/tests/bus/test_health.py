@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
 import pytest
+import zenoh
 
 from hmcs.bus import health
 from hmcs.bus.config import BusSettings
-from hmcs.bus.messages import Ask, Health
+from hmcs.bus.messages import Ask, Envelope, Health, Source
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.bus.wire import encode
 
 EMPTY = {"received": {}, "sent": {}, "lost": {}, "refused": {}, "late": {}}
 
@@ -106,3 +108,39 @@ def test_where_nobody_is_there_that_is_told(asked) -> None:
     code, out = asked({})
     assert code == 1
     assert "nobody answered on" in out
+
+
+@pytest.mark.parametrize(
+    ("service", "instance"), [("other", "hung"), ("thing", "\x1b[2J"), ("thing", "b")]
+)
+def test_one_that_answers_in_its_place_does_not_make_a_silent_one_healthy(
+    asked, router, service, instance
+) -> None:
+    stranger = Source(service=service, instance=instance, boot="b")
+    with Bus.open(BusSettings(router=router), "stranger", "s") as bus:
+        key = bus.keys.rpc("thing", "hung", "health")
+
+        def pretend(query: zenoh.Query) -> None:
+            with query:
+                query.reply(key, encode(said(), Envelope(source=stranger, seq=0)))
+
+        bus._declared.append(bus._session.declare_queryable(key, pretend))
+        code, out = asked({}, ("hung",))
+    assert code == 1
+    assert "hung: is present, but did not answer" in out
+
+
+@pytest.mark.parametrize(("service", "instance"), [("other", "x"), ("thing", "\x1b[2J")])
+def test_what_nobody_of_the_service_can_have_said_makes_nobody_ill(
+    asked, router, service, instance
+) -> None:
+    stranger = Source(service=service, instance=instance, boot="b")
+    with Bus.open(BusSettings(router=router), "stranger", "s") as bus:
+        key = bus.keys.rpc("thing", "x", "health")
+
+        def pretend(query: zenoh.Query) -> None:
+            with query:
+                query.reply(key, encode(said(False), Envelope(source=stranger, seq=0)))
+
+        bus._declared.append(bus._session.declare_queryable(key, pretend))
+        assert asked({"a": said}) == (0, "")

@@ -248,3 +248,14 @@ def test_demonstrations_without_directions_are_refused(demonstrations, says):
 def test_too_short_chords_are_refused():
     with pytest.raises(ValueError, match="least_steps"):
         find_directions([corner()], DirectionSettings(least_steps=3))
+
+
+def test_a_stretch_that_leads_backward_is_not_along_a_direction():
+    out = np.linspace([0.0, 0, 0], [0.1, 0, 0], 11)
+    chords = Chords(np.vstack([out, out[-2::-1]]), 0.0)
+    (along,) = chords.costs(np.array([[1.0, 0.0, 0.0]]))
+    # Out along the line it costs nothing; back it costs all that its points scatter.
+    assert along[10, 0] == pytest.approx(0.0, abs=1e-12)
+    back = out[::-1] - out.mean(axis=0)
+    assert along[20, 10] == pytest.approx((back**2).sum())
+    assert chords.least_costs()[20, 10] == pytest.approx(0.0, abs=1e-12)

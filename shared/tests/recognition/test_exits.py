@@ -50,3 +50,19 @@ def test_learned_exits_are_where_segments_ended():
 def test_exits_are_never_quite_sure():
     features = 1e6 * np.array([[1.0] + [0.0] * 9, [-1.0] + [0.0] * 9])
     np.testing.assert_array_equal(exit_probability(DEFAULT_WEIGHTS, features), [HIGHEST, LOWEST])
+
+
+def test_a_gesteme_of_hundreds_of_steps_is_not_left_by_chance():
+    # However sure the regression is that it goes on, some is lost at every step.
+    assert (1.0 - LOWEST) ** 500 > 0.9
+
+
+def test_a_turn_is_a_sign_of_leaving_near_the_end_only():
+    away = np.array([[1.0, 1.0]])
+
+    def turn(steps_from_end: float) -> float:
+        place = np.array([[-steps_from_end, 0.0]])
+        return float(exit_features(np.ones(1), place, np.array([[1.0, 0.0]]), away)[0, 8])
+
+    assert turn(2.5) == pytest.approx(turn(0.0) * np.exp(-0.5))
+    assert turn(6.0) < 0.1 * turn(0.0)

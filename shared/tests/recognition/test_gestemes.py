@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from hmcs.motion.steps import Step, steps_of
+from hmcs.motion.steps import Step, steps_of, steps_of_demonstration
+from hmcs.recognition.alignment import Alignment
 from hmcs.recognition.exits import exit_features, exit_probability
+from hmcs.recognition.gesteme_learning import LearningSettings
 from hmcs.recognition.gestemes import GestemeBank
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.hmm.inference import forward
 from hmcs.recognition.layered import bank_of, filter_of
+from hmcs.recognition.learning import learn
+from hmcs.recognition.senses import SenseWeights
 
 
 @pytest.fixture(scope="module")
@@ -151,3 +155,71 @@ def test_pruning_changes_no_belief(model, steps):
         np.testing.assert_allclose(
             one.step(full.step(step)).states, other.step(pruned.step(step)).states, atol=1e-6
         )
+
+
+def test_a_bank_that_gains_gestemes_still_knows_how_the_hand_was_turned(task, performances):
+    def turned(seed):
+        demonstration = performances(["along", "round", "up"], seed)
+        half = np.linspace(0, 0.8, len(demonstration.positions))
+        quaternions = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
+        return demonstration._replace(orientations=quaternions)
+
+    settings = LearningSettings(senses=SenseWeights(turn=1.0))
+    model = learn(task, [turned(seed) for seed in range(3)], settings)
+    steps = steps_of_demonstration(turned(50), task.dead_zone_m)
+    whole, part, fresh = bank_of(model), bank_of(model, [0, 1]), bank_of(model, [2])
+    for step in steps[:10]:
+        whole.step(step), part.step(step), fresh.step(step)
+    replaced = part.replaced(fresh, [0, 1])
+    for step in steps[10:14]:
+        expected, found = whole.step(step), replaced.step(step)
+        np.testing.assert_array_equal(found.log_ratio, expected.log_ratio)
+
+
+@pytest.fixture(scope="module")
+def bank_of_round(model):
+    def make(sigma):
+        scoring = model.knowledge.scoring._replace(
+            alignment=Alignment(sigma=sigma), prune_nats=np.inf
+        )
+        return GestemeBank(model.knowledge.parameters, scoring, model.axes, [1])
+
+    return make
+
+
+def performed_round(step_m, size, turn_rad):
+    """The gesteme `round`, larger and turned about z."""
+    steps = int(0.08 * size * np.pi / step_m)
+    angle = np.linspace(0, np.pi, steps + 1)
+    path = 0.08 * size * np.stack([np.sin(angle), 1 - np.cos(angle), 0 * angle], axis=1)
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    path = path @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return [Step(k, path[k], move) for k, move in enumerate(np.diff(path, axis=0))]
+
+
+@pytest.mark.parametrize("size", [1.2, 1.3])
+def test_what_remains_of_a_gesteme_is_counted_in_the_size_it_is_performed_in(
+    bank_of_round, model, size
+):
+    left, off = 5, {}
+    for sigma in (0.0, 0.3):
+        bank, steps = (
+            bank_of_round(sigma),
+            performed_round(model.knowledge.parameters.step_m, size, 0.0),
+        )
+        for step in steps[: len(steps) - left]:
+            bank.step(step)
+        off[sigma] = abs(bank.exit_features[0, 3] - (left + 0.5))
+    # Once it is known how large it is performed, much less is missing from what is left.
+    assert off[0.3] < 0.75 * off[0.0]
+
+
+@pytest.mark.parametrize("turn_rad", [-0.25, 0.0, 0.25])
+def test_a_gesteme_performed_turned_is_no_sign_of_leaving_it(bank_of_round, model, turn_rad):
+    bank = bank_of_round(0.3)
+    for step in performed_round(model.knowledge.parameters.step_m, 1.0, turn_rad):
+        bank.step(step)
+    features = bank.exit_features[0]
+    # Its end is near, and the step went as it was expected to.
+    assert features[7] > 0.5
+    assert features[8] < 0.25 * turn_rad**2 + 0.02

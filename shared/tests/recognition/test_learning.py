@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.steps import steps_of
+from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.content import taken_apart
-from hmcs.recognition.gesteme_learning import LearningSettings
+from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
+from hmcs.recognition.gestemes import GestemeBank, Scoring
 from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.learning import learn
-from hmcs.recognition.segments import LearningError, segments_of
+from hmcs.recognition.segments import LearningError, Segment, segments_of
+from hmcs.recognition.variants import VariantSettings
+from hmcs.task import Task
 
 ORDER = ["along", "round", "up", "along", "round", "up"]
 STATE = {"along": 0, "round": 1, "up": 2}
@@ -144,3 +147,111 @@ def test_refining_by_baum_welch_keeps_recognition(task, performances):
         model = learn(task, demonstrations, LearningSettings(refine_iterations=iterations))
         found, true, _ = recognized(model, performances(ORDER, 77))
         assert (found == true).mean() > 0.93
+
+
+def fan(angles, steps=30):
+    """Straight lines of ten millimeters a step at these angles, as performances of one gesteme."""
+    moves = 0.01 * np.stack([np.cos(angles), np.sin(angles), 0 * np.asarray(angles)], axis=1)
+    result = []
+    for k, move in enumerate(moves):
+        made = [Step(t, t * move, move) for t in range(steps)]
+        positions = np.arange(steps + 1)[:, None] * move
+        result.append(Segment(f"fan-{k}", 0, 0, positions, tuple(made), demonstration_index=k))
+    return result
+
+
+def test_variances_are_shrunk_toward_those_of_all_gestemes_by_how_many_were_shown():
+    angle = 0.3
+    spread, still = fan([-angle, 0.0, angle]), fan([0.0, 0.0, 0.0])
+    settings = LearningSettings(refine_iterations=0, variants=VariantSettings(apart=1e9))
+    variances = fit_gestemes([spread, still], (0, 1, 2), settings).variances
+    # Of the direction along y: sin² for three lines, nothing for the three that are the same.
+    own = np.array([np.sin(angle) ** 2, 0.0])
+    prior, floor = own.mean(), settings.direction_floor**2
+    expected = (2.0 * own + settings.prior_demonstrations * prior) / (
+        2.0 + settings.prior_demonstrations
+    )
+    np.testing.assert_allclose(variances[:, 0, 4], expected + floor, rtol=1e-6)
+
+
+def test_each_way_of_performing_a_gesteme_is_begun_as_often_as_it_was_shown():
+    rng = np.random.default_rng(0)
+    ways = fan([*(0.01 * rng.normal(size=7)), *(np.pi / 2 + 0.01 * rng.normal(size=2))])
+    parameters = fit_gestemes([ways], (0, 1, 2), LearningSettings())
+    begun = [parameters.initial[0, parameters.variant[0] == v].sum() for v in (0, 1)]
+    np.testing.assert_allclose(sorted(begun), [2 / 9, 7 / 9])
+
+
+def held_out_scores(task, demonstrations):
+    """Log density of every step of each demonstration under a model of the others, T = 1."""
+    every = segments_of(task, demonstrations)
+    scores = []
+    for left in range(len(demonstrations)):
+        kept = [
+            [s for s in every if s.gesteme == g and s.demonstration_index != left] for g in range(3)
+        ]
+        parameters = fit_gestemes(kept, (0, 1, 2), LearningSettings())
+        for segment in (s for s in every if s.demonstration_index == left):
+            scoring = Scoring(0.0, 1.0, len(segment.steps) + 1, np.inf)
+            bank = GestemeBank(parameters, scoring, (0, 1, 2), [segment.gesteme])
+            for k, step in enumerate(segment.steps):
+                scores.append(bank.step(step._replace(index=k)).log_ratio[0])
+    return np.array(scores)
+
+
+def test_the_background_lies_one_temperature_below_all_but_a_hundredth_of_known_steps(
+    task, performances
+):
+    demonstrations = [performances(["along", "round", "up"], seed) for seed in range(3)]
+    learned = learn(task, demonstrations, LearningSettings(unknown_rise=0.0)).knowledge
+    lowest = np.quantile(held_out_scores(task, demonstrations), 0.01)
+    assert learned.scoring.background == pytest.approx(lowest - learned.scoring.temperature)
+
+
+def test_the_background_is_raised_by_a_share_of_the_alarms_threshold(task, performances):
+    demonstrations = [performances(["along", "round", "up"], seed) for seed in range(3)]
+    flat = learn(task, demonstrations, LearningSettings(unknown_rise=0.0)).knowledge
+    raised = learn(task, demonstrations, LearningSettings(unknown_rise=0.9)).knowledge
+    assert flat.alarm.threshold > 0.1
+    rise = flat.scoring.temperature * 0.9 * flat.alarm.threshold
+    assert raised.scoring.background == pytest.approx(flat.scoring.background + rise)
+
+
+def test_files_of_one_name_are_left_out_one_by_one(task, performances):
+    different = [performances(["along", "round", "up"], seed) for seed in range(3)]
+    same = [each._replace(name="take.csv") for each in different]
+    ours, theirs = (learn(task, each).knowledge for each in (different, same))
+    assert ours.scoring == theirs.scoring
+    assert ours.alarm == theirs.alarm
+    np.testing.assert_array_equal(ours.parameters.exit_weights, theirs.parameters.exit_weights)
+
+
+def test_a_gesteme_of_hundreds_of_steps_is_recognized_to_its_end(task, performances):
+    task = Task.model_validate({**task.model_dump(), "dead_zone_m": 7e-4})
+    shown = resampled(performances(["along", "round", "up"], 0), 6)
+    model = learn(task, [shown], LearningSettings(refine_iterations=0))
+    found, true, _ = recognized(model, resampled(performances(["along", "round", "up"], 9), 6))
+    longest = max(np.bincount(true))
+    assert longest > 300
+    assert model.knowledge.scoring.window_steps > longest
+    for state in range(3):
+        own = np.flatnonzero(true == state)
+        assert (found[own[len(own) // 2 :]] == state).mean() > 0.9
+
+
+def resampled(demonstration, times):
+    """So many samples for one, on straight lines between them."""
+    given = np.arange(len(demonstration.time_s))
+    wanted = np.linspace(0, given[-1], times * len(given))
+    at = [np.interp(wanted, given, column) for column in demonstration.positions.T]
+    states = tuple(demonstration.states[int(k)] for k in wanted)
+    return Demonstration(demonstration.name, wanted / 100.0, np.stack(at, axis=1), states)
+
+
+def test_a_window_that_is_set_too_short_is_told(task, performances):
+    said = []
+    demonstrations = [performances(["along", "round", "up"], seed) for seed in range(2)]
+    learn(task, demonstrations, LearningSettings(window_limit_steps=10), progress=said.append)
+    assert any("window_limit_steps is 10: it is not recognized to its end" in s for s in said)
+    with pytest.raises(LearningError, match="expected 1 to 1999"):
+        learn(task, demonstrations, LearningSettings(window_limit_steps=5_000))

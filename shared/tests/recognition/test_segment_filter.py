@@ -203,3 +203,41 @@ def test_dropping_what_is_negligible_changes_the_belief_by_less_than_it_drops():
     for item in evidence:
         full, small = exact.step(item), pruned.step(item)
         np.testing.assert_allclose(small.states, full.states, atol=1e-3)
+
+
+def pairs(step, given, gestemes=(0, 1)):
+    """Evidence of pairs (gesteme, start): (exit, log ratio)."""
+    return StepEvidence(
+        step,
+        gestemes,
+        np.array([g for g, _ in given], dtype=np.int32),
+        np.array([s for _, s in given], dtype=np.int32),
+        np.array([exits for exits, _ in given.values()]),
+        np.array([ratio for _, ratio in given.values()]),
+    )
+
+
+def test_a_missing_gesteme_costs_nothing_however_long_ago_its_segment_began():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    for t in range(6):
+        task_filter.step(pairs(t, {(0, 0): (0.0, 4.0 if t else 2.0), (1, 0): (0.0, -9.0)}))
+    # Nothing is heard of gesteme 0, and what is heard of the other began just now.
+    belief = task_filter.step(pairs(6, {(1, 6): (0.0, 0.0)}, gestemes=(1,)))
+    assert belief.missing == (0,)
+    assert belief.states[0] > 0.9
+    assert belief.segment_start == 0
+
+
+def test_what_is_dropped_does_not_come_back():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    strict = SETTINGS._replace(drop_below=1e-3, any_state=0.0, again=0.0, recover=0.0)
+    believed = {}
+    for name, dropping in (("dropped", strict), ("kept", strict._replace(drop_below=0.0))):
+        task_filter = SegmentFilter(chain, dropping)
+        task_filter.step(pairs(0, {(0, 0): (0.0, 12.0), (1, 0): (0.0, 0.0)}))
+        # What was all but impossible would be nearly certain now.
+        belief = task_filter.step(pairs(1, {(0, 0): (0.0, 0.0), (1, 0): (0.0, 40.0)}))
+        believed[name] = belief.states[1]
+    assert believed["kept"] > 0.99
+    assert believed["dropped"] == 0.0

@@ -64,3 +64,14 @@ def test_a_demonstration_without_a_sense_that_counts_is_told(task, performances)
     demonstrations.append(performances(["along", "round", "up"], 1))
     with pytest.raises(LearningError, match=r"'seed-1' has no force: record it, or set its weight"):
         learn(task, demonstrations, LearningSettings(senses=SenseWeights(force=1.0)))
+
+
+def test_silence_counts_as_the_sense_does_on_average():
+    rng = np.random.default_rng(0)
+    means, variances = rng.normal(size=(2, 3, 3)), rng.uniform(0.2, 3.0, (2, 3, 3))
+    senses = Senses(("force",), means, variances, np.array([1.0, 0.5, 2.0]))
+    drawn = means + np.sqrt(variances) * rng.normal(size=(20_000, 2, 3, 3))
+    # What each phase expects of itself, on average over what it lets one feel.
+    squares = ((drawn - means) ** 2 / variances).mean(axis=0)
+    average = (-0.5 * senses.weights * (squares + np.log(2 * np.pi * variances))).sum(axis=2)
+    np.testing.assert_allclose(log_densities(senses, np.full(3, np.nan)), average, atol=0.05)

@@ -1,6 +1,7 @@
 """The alarm: few false ones on motion like that it was learned from, and no single step decides."""
 
 import numpy as np
+import pytest
 
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm, fit_of, learn_alarm
 
@@ -47,3 +48,31 @@ def test_a_step_that_is_probably_unknown_fits_badly():
     fits = fit_of(np.array([1.0, 1.0]), np.array([0.0, 0.999]))
     assert fits[0] == 1.0
     assert fits[1] < -5.0
+
+
+def test_of_one_performance_the_threshold_is_four_deviations_of_its_windows_below_their_mean():
+    fits = np.random.default_rng(0).normal(2.0, 0.3, 400)
+    windows = np.convolve(fits, np.full(20, 1 / 20), mode="valid")
+    settings = learn_alarm([fits], 20)
+    assert settings.threshold == pytest.approx(windows.mean() - 4.0 * windows.std(), abs=0.02)
+
+
+def test_of_few_performances_the_threshold_is_a_prediction_bound_for_another():
+    # Each at a level of its own, so that its windows are all alike.
+    levels = np.array([1.0, 1.4, 1.9])
+    settings = learn_alarm([np.full(60, level) for level in levels], 20)
+    student_90 = 1.886
+    bound = levels.mean() - student_90 * levels.std(ddof=1) * np.sqrt(1 + 1 / 3)
+    pooled = np.repeat(levels, 41)
+    assert settings.threshold == pytest.approx(min(bound, pooled.mean() - 4 * pooled.std()))
+
+
+def test_a_bound_from_many_performances_holds_for_nine_in_ten_others():
+    rng = np.random.default_rng(3)
+    kept = []
+    for _ in range(400):
+        levels = rng.normal(0.0, 1.0, 5)
+        threshold = learn_alarm([np.full(30, 100.0 * level) for level in levels[:4]], 20).threshold
+        kept.append(100.0 * levels[4] > threshold)
+    # The margin of four deviations adds to it.
+    assert np.mean(kept) > 0.9

@@ -205,3 +205,27 @@ def test_each_step_tells_the_factor_at_the_sample_that_completed_it(
         told = at_sample[step.envelope.origin.seq]
         assert row["recorded_factor"] == told.factor
         assert row["replayed_compliance"] == pytest.approx(told.compliance, abs=1e-6)
+
+
+@pytest.mark.parametrize(("later_ticks", "later_ms"), [(40, 400.0), (140, math.nan)])
+def test_what_a_fixture_does_a_second_later_it_does_for_other_reasons(
+    said: list[Logged], again: Again, later_ticks: int, later_ms: float
+) -> None:
+    """A fixture that takes hold so much later is compared with no earlier one."""
+    _, fixture = again(said)
+    ticks = list(fixture.ticks)
+    free = next(tick.now for tick in ticks if not tick.now.guides)._replace(engaged=True)
+    stiff = next(tick.now for tick in ticks if tick.now.guides)._replace(engaged=True)
+    begins = len(ticks) // 3
+    made = fixture._replace(
+        ticks=tuple(
+            tick._replace(
+                then=stiff if number >= begins else free,
+                now=stiff if number >= begins + later_ticks else free,
+            )
+            for number, tick in enumerate(ticks)
+        )
+    )
+    figures = fixtures_compared(made)
+    assert (figures.recorded_takes_hold, figures.replayed_takes_hold) == (1, 1)
+    assert figures.takes_hold_later_ms == pytest.approx(later_ms, nan_ok=True)

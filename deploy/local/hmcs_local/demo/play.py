@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.session import Bus
+from hmcs.bus.verbs import HEALTH
 from hmcs_local.demo.cpu import CpuMeter
 from hmcs_local.demo.progress import PROGRESS, Progress, ProgressLine
 from hmcs_local.demo.truth import RunError
@@ -195,7 +195,7 @@ def _input_settings(plan: Plan) -> dict[str, str]:
 
 def _healths(bus: Bus) -> dict[str, Health]:
     """How every process is, by instance."""
-    answers = bus.ask(bus.keys.rpc(ANY, ANY, "health"), Ask(), Health, _ANSWER_TIMEOUT_S)
+    answers = HEALTH.ask(bus, Ask(), timeout_s=_ANSWER_TIMEOUT_S)
     return {answer.envelope.source.instance: answer.body for answer in answers}
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from hmcs.shown import as_html
 from hmcs.task import Task
 from hmcs_local.demo import figures
 from hmcs_local.demo.measure import Measured
@@ -50,21 +50,21 @@ def page(summary: Summary, task: Task) -> str:
     """Return the page."""
     swap = summary.swap
     return PAGE.substitute(
-        verdict=_verdict(summary),
+        verdict=as_html(_verdict(summary)),
         steps=summary.steps,
         motion_s=f"{summary.motion_s:.0f}",
-        shapes=html.escape(", ".join(gesteme.name for gesteme in task.gestemes)),
-        held_out=" and ".join(map(str, summary.held_out)),
+        shapes=as_html(", ".join(gesteme.name for gesteme in task.gestemes)),
+        held_out=as_html(" and ".join(map(str, summary.held_out))),
         dead_zone_mm=f"{1e3 * task.dead_zone_m:g}",
         xi=f"{task.fixture.maximum_factor:g}",
-        killed=html.escape(swap.killed),
-        newcomer=html.escape(swap.newcomer),
+        killed=as_html(swap.killed),
+        newcomer=as_html(swap.newcomer),
         killed_at_s=f"{swap.at_s:.1f}",
         ready_after_s=f"{swap.ready_after_s:.1f}",
         stopped=_stopped(summary),
         rows="\n".join(_row(line) for line in lines(summary)),
         meanings="\n".join(_meanings()),
-        versions=html.escape(", ".join(f"{k} {v}" for k, v in summary.versions.items())),
+        versions=as_html(", ".join(f"{k} {v}" for k, v in summary.versions.items())),
         seed=summary.seed,
     )
 
@@ -154,12 +154,10 @@ def _stopped(summary: Summary) -> str:
 
 def _row(line: Line) -> str:
     mark = {None: "", True: '<td class="yes">reached</td>', False: '<td class="no">missed</td>'}
-    cells = "".join(
-        f"<td>{html.escape(cell)}</td>" for cell in (line.figure, line.value, line.goal)
-    )
+    cells = "".join(f"<td>{as_html(cell)}</td>" for cell in (line.figure, line.value, line.goal))
     return f"<tr>{cells}{mark[line.reached] or '<td></td>'}</tr>"
 
 
 def _meanings() -> Iterable[str]:
     for name, meaning in described().items():
-        yield f"<dt><code>{html.escape(name)}</code></dt><dd>{html.escape(meaning)}</dd>"
+        yield f"<dt><code>{as_html(name)}</code></dt><dd>{as_html(meaning)}</dd>"

@@ -69,6 +69,15 @@ def test_page_shows_all_figures_and_needs_nothing_from_elsewhere(
     assert 'class="warning"' not in text
 
 
+def test_page_shows_names_as_they_read(summary: Summary, model: Model) -> None:
+    evil = "<script>top.ran=1</script>\x1b[2J"
+    swap = summary.swap.model_copy(update={"killed": evil, "newcomer": evil})
+    text = page(summary.model_copy(update={"swap": swap, "versions": {evil: evil}}), model.task)
+    assert "<script" not in text
+    assert "\x1b" not in text
+    assert text.count("&lt;script&gt;top.ran=1&lt;/script&gt;\\x1b[2J") == 4
+
+
 def test_page_tells_when_the_robot_stopped(summary: Summary, model: Model) -> None:
     text = page(summary.model_copy(update={"stops": 1}), model.task)
     assert 'class="warning"' in text

@@ -1,52 +1,50 @@
-"""Stop for everybody: every robot is asked to stand, whatever device drives it."""
+"""Stop for everybody: every robot is to stand, whatever device drives it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
-from hmcs.bus.keys import ANY, Member
-from hmcs.bus.messages import Ask, Done
-from hmcs.bus.session import Answer, Bus
+from hmcs.bus.keys import Member
+from hmcs.bus.messages import Ask, StopRequest
+from hmcs.bus.session import Bus
+from hmcs.bus.verbs import STOP
 from hmcs.shown import Markdown
 from hmcs_console.asking import Asking
 
 ANSWERS_WITHIN_S = 1.0
-MOST_APART = 32
-"""So many robots are asked each for itself, all at once; the others by one question to all."""
-_VERB = "stop"
-_SILENT = Markdown("**may still move**: it gave no answer, or refused")
+MOST_ASKED = 32
+"""So many robots are asked what came of it, all at once; a cell has one or two."""
+_NOT_ASKED = Markdown(
+    "**may still move**: it was told to stand, and is not asked: there are too many"
+)
 
 
 class Stopping:
-    """Asks robots to stand, on threads of its own: a stop does not wait for other answers."""
+    """Has robots stand, and asks each what came of it, on threads of its own."""
 
     def __init__(self, bus: Bus) -> None:
-        self._all = bus.keys.rpc("robot", ANY, _VERB)
-        self._asking = Asking(bus, at_once=MOST_APART + 1, waiting=MOST_APART)
+        self._requests = bus.publisher(StopRequest, bus.keys.stop_request)
+        self._reason = f"Stop on the page of {bus.source.service} {bus.source.instance}"
+        self._asking = Asking(bus, at_once=MOST_ASKED, waiting=MOST_ASKED)
         self._came: dict[Member, str] = {}
         """What came of the last stop; empty while it is waited for."""
-        self._asked_all = False
 
-    def stop_everybody(
-        self, robots: Iterable[Member], tell: Callable[[str], None], *, crowded: bool = False
-    ) -> None:
-        """Have robots stand; tell in a line each what came of it, anew with every answer.
+    def stop_everybody(self, robots: Iterable[Member], tell: Callable[[str], None]) -> None:
+        """Have every robot stand; tell in a line what came of it for each of these.
 
-        All are asked at once, so that one that does not answer holds up no other. One that is being
-        asked already is not asked twice. Where there is none, or more than can be asked each for
-        itself, or it is `crowded`, so that some may not be seen, whoever answers for a robot is
-        asked as well.
+        One message goes to all, whoever is seen here and whoever hangs. Then each is asked, all at
+        once, so that one that does not answer holds up no other; it is told anew with every answer.
+        One that is being asked already is not asked twice.
         """
+        self._requests.put(StopRequest(reason=self._reason))
         wanted = sorted(robots)
         on_the_way = {robot for robot in wanted if self._came.get(robot) == ""}
-        self._came = dict.fromkeys(wanted, "")
-        apart, others = wanted[:MOST_APART], wanted[MOST_APART:]
-        for robot in apart:
+        self._came = dict.fromkeys(wanted[:MOST_ASKED], "")
+        self._came |= dict.fromkeys(wanted[MOST_ASKED:], _NOT_ASKED)
+        for robot in wanted[:MOST_ASKED]:
             if robot not in on_the_way:
                 self._ask(robot, partial(self._come, robot, tell))
-        if (crowded or others or not apart) and not self._asked_all:
-            self._ask_all(others, tell)
         tell(said(self._came))
 
     def take(self) -> None:
@@ -61,28 +59,7 @@ class Stopping:
         def failed(reason: str) -> None:
             come(Markdown("**may still move**: {}").format(reason))
 
-        self._asking.request(robot, _VERB, Ask(), come, failed, ANSWERS_WITHIN_S)
-
-    def _ask_all(self, others: Iterable[Member], tell: Callable[[str], None]) -> None:
-        self._asked_all = True
-
-        def come(answers: list[Answer[Done]]) -> None:
-            self._asked_all = False
-            told = {
-                Member(answer.envelope.source.service, answer.envelope.source.instance): answer.body
-                for answer in answers
-            }
-            for robot in others:
-                self._came[robot] = told[robot].detail if robot in told else _SILENT
-            tell(said(self._came))
-
-        def failed(reason: str) -> None:
-            self._asked_all = False
-            for robot in others:
-                self._came[robot] = Markdown("**may still move**: {}").format(reason)
-            tell(said(self._came))
-
-        self._asking.ask(self._all, Ask(), Done, come, failed, ANSWERS_WITHIN_S)
+        self._asking.request(robot, STOP, Ask(), come, failed, ANSWERS_WITHIN_S)
 
     def _come(self, robot: Member, tell: Callable[[str], None], what: str) -> None:
         if robot in self._came:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 LONGEST_ROWS = 300
 EVERY_S = 0.1
 """How often a row is written down."""
+_SMALLEST, _LARGEST = 1e-9, 1e9
+"""Of a plot's limits."""
 SPAN_S = LONGEST_ROWS * EVERY_S
 
 
@@ -48,14 +50,14 @@ def limits(columns: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
     told = np.concatenate([np.zeros(1), *columns])
     told = told[np.isfinite(told)]
     lower, upper = float(told.min()), float(told.max())
-    if lower == upper:
-        return 0.0, 1.0
-    return -_round_up(-lower), _round_up(upper)
+    rounded = -_round_up(-lower), _round_up(upper)
+    return (0.0, 1.0) if rounded[0] == rounded[1] else rounded
 
 
 def _round_up(value: float) -> float:
-    """The next of …, 0.1, 0.2, 0.5, 1, 2, 5, …; 0 for 0."""
-    if value <= 0:
+    """The next of …, 0.1, 0.2, 0.5, 1, 2, 5, …; 0 for what is too small to be told from it."""
+    if value < _SMALLEST:
         return 0.0
+    value = min(value, _LARGEST)
     power = 10.0 ** np.floor(np.log10(value))
     return next(float(step * power) for step in (1, 2, 5, 10) if value <= step * power * (1 + 1e-9))

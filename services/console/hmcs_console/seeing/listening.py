@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from functools import partial
 
-from hmcs.bus.keys import ANY, KeyNameError, Member, check_name
+from hmcs.bus.keys import ANY, Member, is_name, recognizer_in
 from hmcs.bus.logs import Seldom
 from hmcs.bus.messages import Belief, Evidence, FixtureState, Motion, RobotState, Step
 from hmcs.bus.session import Bus, Received
@@ -69,7 +69,7 @@ class Listening:
 
     def _on_belief(self, received: Received[Belief]) -> None:
         belief = received.body
-        name = self._recognizer_in(received.key, self._bus.keys.belief(ANY), Belief.SCHEMA)
+        name = self._recognizer_in(received.key, Belief.SCHEMA)
         if name is None:
             return
         now_s = received.received_ns / NS_PER_S
@@ -85,7 +85,7 @@ class Listening:
             self._in_slow_loop("belief", received)
 
     def _on_evidence(self, received: Received[Evidence]) -> None:
-        name = self._recognizer_in(received.key, self._bus.keys.evidence(ANY), Evidence.SCHEMA)
+        name = self._recognizer_in(received.key, Evidence.SCHEMA)
         if name is None:
             return
         if not usable(received.body):
@@ -93,16 +93,14 @@ class Listening:
             return
         self._seen.evident(name, received.body)
 
-    def _recognizer_in(self, key: str, pattern: str, schema: str) -> str | None:
-        """The name that stands in a key, before the rest; one that is none is refused."""
-        before, after = pattern.split(ANY)[:2]
-        name = key.removeprefix(before).split(after)[0]
-        try:
-            return check_name("model", name)
-        except KeyNameError as error:
-            self._bus.counters.count_refused(schema, str(error))
-            self._seldom.warning("name", "no name of a recognizer", key=key, reason=str(error))
-            return None
+    def _recognizer_in(self, key: str, schema: str) -> str | None:
+        """The name of a recognizer that stands in a key; what is none is refused."""
+        name = recognizer_in(key).model
+        if is_name(name):
+            return name
+        self._bus.counters.count_refused(schema, "its key names no recognizer")
+        self._seldom.warning("name", "a key names no recognizer: refused", key=key)
+        return None
 
     def _in_slow_loop(self, stage: str, received: Received[Step] | Received[Belief]) -> None:
         origin = received.envelope.origin

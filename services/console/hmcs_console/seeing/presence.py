@@ -1,7 +1,6 @@
 """Who is there, and who works for which model, by the tokens they show.
 
-Anybody may show a token of any name. What is no name of a process is refused and counted here, so
-that nothing further on has to ask.
+The bus refuses and counts tokens of what is no name. But anybody may show any number of names.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from hmcs.bus.keys import ANY, KeyNameError, Member, check_name
+from hmcs.bus.keys import ANY, Member
 from hmcs.bus.logs import Seldom
 from hmcs.bus.session import Bus
 from hmcs_console.seeing.seen import Seen
@@ -34,11 +33,11 @@ class Presence:
         self._working: set[tuple[str, Member]] = set()
         """Models, each with a process that works for it."""
         bus.watch(bus.keys.presence(ANY, ANY), self._on_presence)
-        bus.watch(bus.keys.member(ANY, ANY, ANY), self._on_member)
+        bus.watch(bus.keys.member(ANY), self._on_member)
 
     def _on_presence(self, key: str, alive: bool) -> None:
-        member, members = self._member_in(key, alive), self._seen.members
-        if member is None or member == (self._bus.source.service, self._bus.source.instance):
+        member, members = self._bus.keys.member_of(key), self._seen.members
+        if member == (self._bus.source.service, self._bus.source.instance):
             return
         if not alive:
             members.discard(member)
@@ -50,15 +49,7 @@ class Presence:
             self._came(member)
 
     def _on_member(self, key: str, alive: bool) -> None:
-        member = self._member_in(key, alive)
-        if member is None:
-            return
-        model = key.split("/")[-4]
-        try:
-            check_name("model", model)
-        except KeyNameError as error:
-            self._refuse(key, str(error), alive)
-            return
+        model, member = self._bus.keys.model_of(key), self._bus.keys.member_of(key)
         if not alive:
             if (model, member) in self._working:
                 self._working.discard((model, member))
@@ -69,17 +60,6 @@ class Presence:
             self._working.add((model, member))
             self._seen.runners.came(model, member)
 
-    def _member_in(self, key: str, alive: bool) -> Member | None:
-        try:
-            member = self._bus.keys.member_of(key)
-            check_name("service", member.service)
-            check_name("instance", member.instance)
-        except KeyNameError as error:
-            self._refuse(key, str(error), alive)
-            return None
-        return member
-
-    def _refuse(self, key: str, reason: str, alive: bool = True) -> None:
-        if alive:
-            self._bus.counters.count_refused(REFUSED, reason)
-            self._seldom.warning(REFUSED, "presence refused", key=key, reason=reason)
+    def _refuse(self, key: str, reason: str) -> None:
+        self._bus.counters.count_refused(REFUSED, reason)
+        self._seldom.warning(REFUSED, "presence refused", key=key, reason=reason)

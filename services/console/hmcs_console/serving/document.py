@@ -51,7 +51,7 @@ def load_document() -> Document:
         "Content-Security-Policy: " + "; ".join(f"{what} {who}" for what, who in policy.items()),
         "Cache-Control: no-store",
     )
-    return Document(body, gzip.compress(body), headers)
+    return Document(body, gzip.compress(body, mtime=0), headers)
 
 
 def _digest(script: bytes) -> str:

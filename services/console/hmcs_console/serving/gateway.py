@@ -1,7 +1,7 @@
 """The door of the page: answers what is asked for over HTTP, and hands WebSockets through.
 
-The page's own server listens at a loopback port nobody is told of, and hears nothing but requests
-made here and messages that were read here.
+The page's own server listens at a loopback port, and hears nobody but this door: requests that were
+made here, and messages that were read here.
 
 A browser that sends more than any hand makes it send, or what no page says, is sent away. To slow
 it down would be worse: what its operator did last would wait behind all of that, and letting go
@@ -16,9 +16,8 @@ import ssl
 import threading
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
-from typing import Any, NamedTuple
+from contextlib import AbstractContextManager, suppress
+from typing import Any, NamedTuple, Protocol
 
 from hmcs.bus.logs import Seldom
 from hmcs.bus.service import UserError
@@ -65,24 +64,39 @@ class Served(NamedTuple):
     """None where connections are not encrypted."""
 
 
+class PageServer(Protocol):
+    """The page's own server."""
+
+    def get_port(self) -> int:
+        """Return the loopback port it listens at."""
+
+    def expects(self, port: int) -> AbstractContextManager[None]:
+        """Let in who comes from a loopback port, as long as the context lasts."""
+
+
 class Gateway:
     """Serves the page; `port` is the one that was free."""
 
     def __init__(
-        self, served: Served, page_port: int, log: logging.Logger, refused: Callable[[str], None]
+        self,
+        served: Served,
+        page: PageServer,
+        log: logging.Logger,
+        refused: Callable[[str], None],
     ) -> None:
-        """Open the door to the page's server at loopback `page_port`; count in `refused` why not.
+        """Open the door to the page; tell `refused` what is turned away, and why.
 
         Raises UserError where neither the port nor one of those after it can be listened at, and
         where others could reach a page without a token.
         """
         self._served = served
-        self._page_port = page_port
+        self._page = page
         self._refused = refused
         self._seldom = Seldom(log)
         self._document = load_document()
         self._connections: Counter[str] = Counter()
         self._pages = 0
+        self._closing = False
         self._loop = asyncio.new_event_loop()
         self._loop.set_exception_handler(self._failed)
         self._thread = threading.Thread(target=self._loop.run_forever, name="gateway", daemon=True)
@@ -141,6 +155,7 @@ class Gateway:
         await self._server.start_serving()
 
     async def _shut(self) -> None:
+        self._closing = True
         self._server.close()
         tasks = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in tasks:
@@ -177,6 +192,8 @@ class Gateway:
             writer.transport.abort()
             self._turn_away("frames", "a browser is sent away", address, str(error))
         finally:
+            if self._closing:
+                writer.transport.abort()
             with suppress(*ended):
                 await _close(writer)
             self._connections[address] -= 1
@@ -227,20 +244,22 @@ class Gateway:
     async def _hand_through(
         self, head: Head, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        page_reader, page_writer = await asyncio.open_connection("127.0.0.1", self._page_port)
-        page_writer.write(request_for_socket(head, self._page_port))
-        ways = [
-            asyncio.ensure_future(self._pipe_in(reader, page_writer)),
-            asyncio.ensure_future(_pipe(page_reader, writer)),
-        ]
-        try:
-            # Either side gone ends both: a closed page is to be noticed at once.
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for way in ways:
-                way.cancel()
-            came = await asyncio.gather(*ways, return_exceptions=True)
-            page_writer.close()
+        port = self._page.get_port()
+        page_reader, page_writer = await asyncio.open_connection("127.0.0.1", port)
+        with self._page.expects(page_writer.get_extra_info("sockname")[1]):
+            page_writer.write(request_for_socket(head, port))
+            ways = [
+                asyncio.ensure_future(self._pipe_in(reader, page_writer)),
+                asyncio.ensure_future(_pipe(page_reader, writer)),
+            ]
+            try:
+                # Either side gone ends both: a closed page is to be noticed at once.
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for way in ways:
+                    way.cancel()
+                came = await asyncio.gather(*ways, return_exceptions=True)
+                page_writer.close()
         for failure in came:
             if isinstance(failure, HostileError):
                 raise failure
@@ -279,24 +298,3 @@ async def _close(writer: asyncio.StreamWriter) -> None:
             await writer.wait_closed()
     finally:
         writer.transport.abort()
-
-
-def encryption(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return how connections are encrypted, by files of a certificate and of its key.
-
-    Raises UserError where one of them cannot be used.
-    """
-
-    def no_password() -> str:
-        raise UserError(f"the key in {key} asks for a password: give one without")
-
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
-    try:
-        context.load_cert_chain(certificate, key, password=no_password)
-    except (OSError, ssl.SSLError) as error:
-        raise UserError(
-            f"the page cannot be served with certificate {certificate} and key {key}: "
-            f"{error.strerror or error}: give PEM files of a certificate and its key"
-        ) from error
-    return context

@@ -11,6 +11,7 @@ from queue import Empty, Full, Queue
 from typing import Generic, TypeVar
 
 from hmcs.bus.logs import Seldom
+from hmcs.shown import plain
 from hmcs_console.serving.pace import next_rate_hz
 
 T = TypeVar("T")
@@ -56,7 +57,7 @@ class Painter(Generic[T]):
                 self._draw(picture)
                 self.failure = ""
             except Exception as error:
-                self.failure = f"{type(error).__name__}: {error}"
+                self.failure = plain(f"{type(error).__name__}: {error}")
                 self._seldom.warning("drawing", "a drawing failed: going on", exc_info=True)
             took_s = time.monotonic() - began_s
             self.rate_hz = next_rate_hz(self.rate_hz, took_s, self._wanted_hz)

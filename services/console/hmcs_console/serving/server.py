@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import viser
+from viser.infra import WebsockClientConnection
 
 from hmcs.bus.logs import Seldom
 from hmcs.shown import plain
@@ -18,9 +19,10 @@ _LIBRARY_LOG = "websockets.server"
 
 
 class Server(viser.ViserServer):
-    """A viser server that nobody can make reach beyond this machine.
+    """A viser server that hears nobody but the page's door, and reaches nobody beyond this machine.
 
-    What goes wrong in it is a line of the log, seldom, and no traceback each time.
+    Any program here, and any page of any browser here, may find its port; the library asks nobody
+    where they come from. What goes wrong in it is a line of the log, seldom, and no traceback.
     """
 
     def __init__(self, log: logging.Logger) -> None:
@@ -30,8 +32,25 @@ class Server(viser.ViserServer):
         library = logging.getLogger(_LIBRARY_LOG)
         library.addHandler(self._told)
         library.propagate = False
+        self._expected: set[int] = set()
+        self._websock_server.on_client_connect(self._turn_strangers_away)
         loop = self.get_event_loop()
         loop.call_soon_threadsafe(loop.set_exception_handler, self._told.failed)
+
+    @contextlib.contextmanager
+    def expects(self, port: int) -> Iterator[None]:
+        """Let in who comes from a loopback port, as long as the context lasts."""
+        self._expected.add(port)
+        try:
+            yield
+        finally:
+            self._expected.discard(port)
+
+    async def _turn_strangers_away(self, come: WebsockClientConnection) -> None:
+        # Before anything is heard of them.
+        connection = self._websock_server._live_connections.get(come.client_id)
+        if connection is not None and connection.remote_address[1] not in self._expected:
+            await connection.close(1008)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a tunnel would let strangers move the robot."""

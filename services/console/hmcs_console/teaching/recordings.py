@@ -7,6 +7,7 @@ from collections.abc import Callable
 from hmcs.bus.keys import Keys, Member
 from hmcs.bus.messages import Outline, OutlineQuestion
 from hmcs.bus.session import Answer
+from hmcs.bus.verbs import OUTLINE, SET_LABELS
 from hmcs.errors import UserError
 from hmcs_console.asking import Asking
 from hmcs_console.teaching import takes
@@ -99,9 +100,9 @@ class Recordings:
                 self._say(str(error))
 
         self._asking.ask(
-            self._keys.rpc(member.service, member.instance, "outline"),
+            OUTLINE,
+            member,
             OutlineQuestion(recording=name),
-            Outline,
             come,
             lambda reason: self._say(f"the recorder refused: {reason}"),
             timeout_s=READ_S,
@@ -122,7 +123,7 @@ class Recordings:
         self._say("saving …")
         self._asking.request(
             member,
-            "set_labels",
+            SET_LABELS,
             asked,
             lambda said: self._show(takes.saved(self.take, asked, said)),
             self._say,

@@ -10,6 +10,7 @@ import math
 from typing import Literal, NamedTuple
 
 from hmcs.bus.messages import LoadModel, TrainingProgress
+from hmcs.bus.verbs import LOAD_MODEL
 from hmcs.shown import Markdown
 from hmcs_console.seeing.shadows import Agreement
 from hmcs_console.teaching.wishes import Question, activate
@@ -74,8 +75,8 @@ def begun(trained: TrainingProgress | None, active: str) -> Advance:
     load = LoadModel(path=trained.path)
     # The fixture first: a belief of a model that is not loaded there is refused.
     to_ask = (
-        Question("fixture_controller", "load_model", load),
-        Question("recognizer", "load_model", load),
+        Question("fixture_controller", LOAD_MODEL, load),
+        Question("recognizer", LOAD_MODEL, load),
     )
     return Advance(takeover._replace(to_ask=to_ask), to_ask[0])
 

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from hmcs.bus.keys import KeyNameError, check_name
 from hmcs.bus.messages import (
     ActivateRecognizer,
     Ask,
+    Done,
     Label,
     Message,
     Record,
     Step,
     Train,
 )
+from hmcs.bus.verbs import ACTIVATE, CANCEL, RECORD, TRAIN, Verb
 from hmcs.errors import UserError
 
 
@@ -26,18 +28,18 @@ class Question(NamedTuple):
     """A wish that a process carries out."""
 
     service: str
-    verb: str
+    verb: Verb[Any, Done]
     body: Message
 
 
 def record(on: bool, name: str) -> Question:
     """Return the wish to begin or to end a recording."""
-    return Question("recorder", "record", Record(on=on, name=name.strip()))
+    return Question("recorder", RECORD, Record(on=on, name=name.strip()))
 
 
 def activate(recognizer: str) -> Question:
     """Return the wish that the fixture follows a recognizer."""
-    return Question("fixture_controller", "activate", ActivateRecognizer(model=recognizer))
+    return Question("fixture_controller", ACTIVATE, ActivateRecognizer(model=recognizer))
 
 
 def train(
@@ -59,7 +61,7 @@ def train(
         raise WishError("nothing is trained: name the recordings to learn from, e.g. take-1.mcap")
     return Question(
         "trainer",
-        "train",
+        TRAIN,
         Train(
             model=model.strip(),
             task=task.strip(),
@@ -72,7 +74,7 @@ def train(
 
 def cancel() -> Question:
     """Return the wish that what is being trained is not trained any further."""
-    return Question("trainer", "cancel", Ask())
+    return Question("trainer", CANCEL, Ask())
 
 
 def label(state: str, clock: str, last: Step | None) -> Label:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from hmcs.shown import as_html
 from hmcs_laboratory.figures.figure import Figure
 from hmcs_laboratory.running import versions
 
@@ -84,7 +84,7 @@ Make them without <code>--fast</code> before reading anything from the curves.</
 def page(figures: Sequence[Figure[Any]], made: Sequence[Made], *, fast: bool, seed: int) -> str:
     """Return the page of these figures, as they were made."""
     contents = [
-        f'<a href="#{figure.name}">{figure.number} {html.escape(figure.title)}</a>'
+        f'<a href="#{as_html(figure.name)}">{as_html(f"{figure.number} {figure.title}")}</a>'
         for figure in figures
     ]
     return _PAGE.substitute(
@@ -94,24 +94,24 @@ def page(figures: Sequence[Figure[Any]], made: Sequence[Made], *, fast: bool, se
             _section(figure, each, seed) for figure, each in zip(figures, made, strict=True)
         ),
         seed=seed,
-        versions=html.escape(", ".join(f"{name} {v}" for name, v in versions().items())),
+        versions=as_html(", ".join(f"{name} {v}" for name, v in versions().items())),
     )
 
 
 def _section(figure: Figure[Any], made: Made, seed: int) -> str:
     stand_in = ""
     if figure.stand_in:
-        stand_in = f"<dt>Data</dt><dd>{html.escape(figure.stand_in)}</dd>"
+        stand_in = f"<dt>Data</dt><dd>{as_html(figure.stand_in)}</dd>"
     return _SECTION.substitute(
-        name=figure.name,
-        number=figure.number,
-        title=html.escape(figure.title),
-        shows=html.escape(figure.shows),
-        found=html.escape(made.found),
+        name=as_html(figure.name),
+        number=as_html(str(figure.number)),
+        title=as_html(figure.title),
+        shows=as_html(figure.shows),
+        found=as_html(made.found),
         stand_in=stand_in,
-        differs=html.escape(made.differs),
+        differs=as_html(made.differs),
         seed=seed,
-        shared=f", data of figure {figure.data_of}" if figure.data_of else "",
+        shared=as_html(f", data of figure {figure.data_of}") if figure.data_of else "",
         settings="\n".join(_rows(figure, made.settings)),
     )
 
@@ -119,8 +119,8 @@ def _section(figure: Figure[Any], made: Made, seed: int) -> str:
 def _rows(figure: Figure[Any], settings: Mapping[str, Any]) -> list[str]:
     fields = type(figure.settings).model_fields
     return [
-        f"<tr><td><code>{html.escape(name)}</code></td><td>{html.escape(_value(value))}</td>"
-        f"<td>{html.escape(' '.join((fields[name].description or '').split()))}</td></tr>"
+        f"<tr><td><code>{as_html(name)}</code></td><td>{as_html(_value(value))}</td>"
+        f"<td>{as_html(' '.join((fields[name].description or '').split()))}</td></tr>"
         for name, value in settings.items()
     ]
 

@@ -103,3 +103,12 @@ def test_what_does_not_fit_is_refused():
         scores.log_emission(np.zeros(2))
     with pytest.raises(ObservationError, match="not finite"):
         scores.log_emission(np.array([0.0, np.nan, 0.0]))
+
+
+def test_a_state_all_but_impossible_is_lost_whatever_it_would_explain():
+    transition = np.array([[[1.0 - 1e-305, 1e-305], [0.0, 1.0]]])
+    bank = ForwardBank(np.array([[1.0, 0.0]]), transition)
+    bank.step(np.zeros((1, 2)))
+    gain = bank.step(np.array([[0.0, 2_000.0]]))
+    np.testing.assert_array_equal(bank.states, [[1.0, 0.0]])
+    assert gain == pytest.approx(0.0)

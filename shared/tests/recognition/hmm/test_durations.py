@@ -244,3 +244,11 @@ def test_wrong_observations_are_refused(emission, message):
 def test_wrong_evidence_of_durations_is_refused(call, message):
     with pytest.raises(DurationError, match=message):
         call()
+
+
+def test_where_staying_and_entering_are_as_probable_it_stays():
+    # Two steps of the first state, or one and then the second: 1/2 each, to the bit.
+    model = duration_hmm([1.0, 0.0], [[0.0, 1.0], [0.0, 1.0]], [[0.5, 0.5], [1.0, 0.0]])
+    found = decoded(model, np.zeros((2, 2)))
+    assert [segment.steps for segment in found.segments] == [2]
+    assert found.log_probability == np.log(0.5)

@@ -186,3 +186,19 @@ def test_a_force_that_is_not_felt_is_left_out() -> None:
         belief = recognizer.step(step._replace(wrench=None)).belief
         assert np.isfinite(belief.log_likelihood)
         np.testing.assert_allclose(belief.states.sum(), 1.0)
+
+
+def test_a_gesteme_lasts_as_long_as_it_was_demonstrated() -> None:
+    counts = {"right": 24, "up": 12, "left": 7}
+    task = plain_task(
+        {"right": ("right", ["up"]), "up": ("up", ["left"]), "left": ("left", ["right"])}
+    )
+    moves = [(name, name, count) for name, count in counts.items()]
+    model = learn(task, [straight(moves)] * 2, STRICT, recognizer="gesteme-network")
+    network, _ = network_of(model)
+    for state, count in enumerate(counts.values()):
+        own = np.flatnonzero(network.task_state == state)
+        within = network.transition[np.ix_(own, own)]
+        # How often each of its states is visited, from its first one on, before it is left.
+        visits = np.linalg.inv(np.eye(len(own)) - within)[0]
+        assert visits.sum() == pytest.approx(count, rel=0.1)

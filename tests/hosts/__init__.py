@@ -1,0 +1,1 @@
+"""Several hosts, for real: network namespaces with links that are slow, lossy, cut and healed."""
