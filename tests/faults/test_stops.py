@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import RobotState
+from hmcs.bus.messages import Ask, RobotState
 from hmcs.bus.session import Received
-from support.stack import Stack
+from hmcs.bus.verbs import PLAY, STOP
+from support.stack import DEADLINE_S, Stack
 from support.stops import KINDS, FastLoop, How, Victim
 
 TRIALS = 3
@@ -49,6 +50,31 @@ def test_a_robot_that_hung_stands_until_re_engaged(fast_loop: FastLoop) -> None:
     moved_ns = next(r.received_ns for r in watcher.robot[stopped:] if _moves(r))
     assert any(r.received_ns < moved_ns and not r.body.dead_man for r in watcher.motions)
     assert stack.health(robot).healthy
+
+
+def test_a_stop_that_was_asked_for_holds_until_the_played_operator_is_asked_to_play(
+    fast_loop: FastLoop,
+) -> None:
+    """Also one in the rest between two passes, when nobody drives the robot."""
+    stack, watcher = fast_loop.stack, fast_loop.watcher
+    asker = stack.open_bus("asker", "a")
+    for at_rest in (False, True):
+        fast_loop.until_moving()
+        if at_rest:
+            stack.until(lambda: not watcher.motions[-1].body.dead_man)
+        STOP.ask(asker, Ask(), timeout_s=DEADLINE_S)
+        stack.until(lambda: not watcher.motions[-1].body.dead_man)
+        stack.elapse(0.3)
+        watcher.robot.clear()
+        # Longer than a pass and its rest, after which a recording would press again.
+        stack.elapse(2.0)
+        assert not any(_moves(state) for state in watcher.robot)
+        health = stack.health(fast_loop.input)
+        assert health.healthy
+        assert health.detail.startswith("stopped: robot was asked to stand")
+        (answer,) = PLAY.ask(asker, Ask(), timeout_s=DEADLINE_S)
+        assert "goes on at" in answer.body.detail
+        stack.until(lambda: watcher.robot and _moves(watcher.robot[-1]))
 
 
 def _moves(state: Received[RobotState]) -> bool:

@@ -1,4 +1,4 @@
-"""What every source goes through, built in or of another distribution: none is believed blindly."""
+"""The check that every source goes through, built in or of another distribution."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from hmcs_input_device.sources import (
 )
 
 FROZEN_S = 0.5
-"""A hand with a velocity or a force that stays the very same for so long is none that moves."""
+"""A device that repeats the very same motion or force for so long has stopped reporting."""
 FASTEST_RAD_S = 50.0
 """No hand turns faster."""
 JUMP_M = 0.05
-"""So much farther than the fastest hand goes, a position may be off."""
+"""Added to the way of the fastest hand: a position farther from the one before it is a jump."""
 LARGEST_WRENCH = 1e4
 """No hand pushes harder, N and N·m."""
-
-
 STILL_M_S, STILL_N = 1e-3, 0.5
-"""A hand with less may well stay as it is."""
+"""A hand slower and weaker than this rests, and may tell the same for as long as it likes."""
+LETTERS = 200
+"""How much of the text of an exception is shown."""
 
 
 class Guarded:
     """A source whose samples are checked, and whose dead-man counts by the rule of `PressGate`.
 
-    Where the source says nothing, fails, or says what no hand does, the hand rests where it was
-    last. A source that plays has nobody who presses: of it only what is no sample is refused.
+    Where the source returns nothing, raises, or returns what no hand does, the hand rests where it
+    was last. Of a source that plays only malformed samples are refused: nobody presses its switch.
     """
 
     def __init__(self, source: Source, name: str) -> None:
@@ -51,7 +51,7 @@ class Guarded:
         self._told_s = self._same_since_s = -float("inf")
         self._fault = ""
         self.refusal = ""
-        """Why what the source said last is no sample of a hand; empty where it is, or is none."""
+        """Why the last sample was refused as malformed or impossible; empty where it was not."""
 
     @property
     def trouble(self) -> str:
@@ -72,8 +72,8 @@ class Guarded:
         except _NoSampleError as error:
             self._fault = self.refusal = f"{self._name}: {error}"
         except Exception as error:
-            failed = f"{self._name}: it failed with {type(error).__name__} ({error})"
-            self._fault = self.refusal = f"{failed}: look after the device"
+            failed = f"{self._name}: failed with {type(error).__name__} ({str(error)[:LETTERS]})"
+            self._fault = self.refusal = f"{failed}: check the device"
         if self._fault:
             self._gate.passes(now_s, pressed=False, trouble=self._fault)
             self._hand = None if self._hand is None else at_rest(self._hand)
@@ -90,52 +90,62 @@ class Guarded:
         return self._source.trouble if isinstance(self._source, Troubled) else ""
 
     def _checked(self, now_s: float, told: DeviceSample | None) -> DeviceSample:
-        """Return what the source says; raises _NoSampleError or _SilentError otherwise."""
+        """Return a copy of a sample; raises _NoSampleError or _SilentError for an unusable one."""
         if told is None:
-            raise _SilentError("gives no samples: look after the device")
+            raise _SilentError("gives no samples: check the device")
         try:
             motion = Motion(**told._asdict())
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(map(str, first["loc"]))
-            raise _NoSampleError(f"gives samples that are none: {where}: {first['msg']}") from None
+            raise _NoSampleError(f"gives malformed samples: {where}: {first['msg']}") from None
         if not np.abs(motion.position).max() <= FARTHEST_M:
-            raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: begin anew nearer")
+            raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: check its scale")
+        told = _copied(told)
         if not self._plays:
             self._doubt(now_s, told)
         return told
 
     def _doubt(self, now_s: float, told: DeviceSample) -> None:
-        """Raise where no hand does this, or the device cannot know it now."""
+        """Raise where no hand does this, or where the sample is old."""
         before, before_s = self._told, self._told_s
         self._told, self._told_s = told, now_s
         if told.age_s is not None and not 0.0 <= told.age_s <= SILENT_S:
-            raise _SilentError("is silent: look after the device")
+            raise _SilentError("is silent: check the device")
         for what, vector, largest, unit in (
             ("moves", told.velocity, FASTEST_M_S, "m/s"),
             ("turns", told.angular_velocity, FASTEST_RAD_S, "rad/s"),
             ("pushes", told.wrench, LARGEST_WRENCH, "N"),
         ):
             if vector is not None and np.linalg.norm(vector) > largest:
-                raise _NoSampleError(f"{what} with more than {largest:g} {unit}: look after it")
+                raise _NoSampleError(f"{what} with more than {largest:g} {unit}: check the device")
         if before is None or _differ(before, told) or not (told.dead_man and _works(told)):
             self._same_since_s = now_s
         if now_s - self._same_since_s > FROZEN_S:
-            raise _SilentError("has told the very same motion for long: look after the device")
+            raise _SilentError("repeats the very same motion: check the device")
         if before is None or not (self._gate.open and told.dead_man):
             return
         way_m = float(np.linalg.norm(np.subtract(told.position, before.position)))
         held = not (before.clutch or told.clutch)
         if held and way_m > FASTEST_M_S * (now_s - before_s) + JUMP_M:
-            raise _NoSampleError(f"jumped by {way_m:.3g} m: look after the device")
+            raise _NoSampleError(f"jumped by {way_m:.3g} m: check the device")
 
 
 class _NoSampleError(Exception):
-    """What a source says is no sample of a hand."""
+    """A sample is malformed, or no hand does what it tells."""
 
 
 class _SilentError(Exception):
-    """A source says nothing new."""
+    """A source has nothing new to tell."""
+
+
+def _copied(told: DeviceSample) -> DeviceSample:
+    """Return a sample of its own: a device may reuse its arrays."""
+    names = ("position", "velocity", "orientation", "angular_velocity", "wrench")
+    arrays = {name: getattr(told, name) for name in names}
+    return told._replace(
+        **{name: np.array(array) for name, array in arrays.items() if array is not None}
+    )
 
 
 def _works(told: DeviceSample) -> bool:

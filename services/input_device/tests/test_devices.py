@@ -276,8 +276,8 @@ def test_a_stick_that_drifts_after_it_was_let_go_of_moves_nothing_and_says_what_
 
 @pytest.mark.parametrize("dead_band", [0.0, 0.1])
 def test_pressing_the_dead_man_may_push_the_stick(dead_band: float) -> None:
-    desk = Desk(dead_band=dead_band)
-    desk.tell(0.04)
+    desk = Desk(dead_band=dead_band, comes_at=(0.04,))
+    assert desk.source.trouble == ""
     assert desk.tell(0.3, press="hold").dead_man
     assert desk.tell(0.3, press="hold").velocity[0] > 0
     late = Desk()

@@ -81,7 +81,22 @@ def test_what_a_device_tells_is_handed_on_as_it_is() -> None:
         pedal=True,
         age_s=0.1,
     )
-    assert told is desk.arm.says()
+    for name, value in desk.arm.says()._asdict().items():
+        np.testing.assert_array_equal(getattr(told, name), value)
+
+
+def test_a_device_may_reuse_its_arrays() -> None:
+    desk = Desk()
+    desk.hold()
+    at, velocity = np.zeros(3), np.array([0.1, 0.0, 0.0])
+    desk.arm.says = lambda: DeviceSample(at, velocity, dead_man=True)
+    for _ in range(round(2 * FROZEN_S / PERIOD_S)):
+        at += velocity * PERIOD_S
+        assert desk.ask().dead_man
+    here = at.copy()
+    desk.arm.says = nothing
+    at += 1.0
+    np.testing.assert_array_equal(desk.ask().position, here)
 
 
 def test_a_dead_man_that_is_held_from_the_first_sample_on_moves_nothing() -> None:
@@ -111,18 +126,18 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
             said,
         )
         for name, fields, said in (
-            ("nan position", {"position": np.full(3, np.nan)}, "samples that are none: position"),
-            ("huge position", {"position": np.full(3, 1e308)}, "samples that are none: position"),
+            ("nan position", {"position": np.full(3, np.nan)}, "malformed samples: position"),
+            ("huge position", {"position": np.full(3, 1e308)}, "malformed samples: position"),
             ("far position", {"position": np.full(3, 1.01 * FARTHEST_M)}, "farther than 10000 m"),
-            ("flat position", {"position": np.zeros(2)}, "samples that are none: position"),
-            ("no position", {"position": None}, "samples that are none: position"),
-            ("infinite velocity", {"velocity": np.full(3, np.inf)}, "are none: velocity"),
+            ("flat position", {"position": np.zeros(2)}, "malformed samples: position"),
+            ("no position", {"position": None}, "malformed samples: position"),
+            ("infinite velocity", {"velocity": np.full(3, np.inf)}, "malformed samples: velocity"),
             ("fast", {"velocity": np.full(3, FASTEST_M_S)}, "moves with more than 5 m/s"),
-            ("no rotation", {"orientation": np.zeros(4)}, "are none: orientation"),
+            ("no rotation", {"orientation": np.zeros(4)}, "malformed samples: orientation"),
             ("spinning", {"angular_velocity": np.full(3, 100.0)}, "turns with more than 50 rad/s"),
             ("strong", {"wrench": np.full(6, 1e5)}, "pushes with more than 10000 N"),
-            ("nan wrench", {"wrench": np.full(6, np.nan)}, "are none: wrench"),
-            ("a number for a switch", {"dead_man": 1}, "are none: dead_man"),
+            ("nan wrench", {"wrench": np.full(6, np.nan)}, "malformed samples: wrench"),
+            ("a number for a switch", {"dead_man": 1}, "malformed samples: dead_man"),
             ("old", {"age_s": SILENT_S + 0.01}, "is silent"),
             ("from the future", {"age_s": -1.0}, "is silent"),
             ("of no age", {"age_s": float("nan")}, "is silent"),
@@ -207,7 +222,7 @@ def test_a_motion_or_force_that_stays_the_very_same_is_that_of_no_hand(
     assert desk.tell(**fields, times=round(0.9 * FROZEN_S / PERIOD_S)).dead_man
     assert desk.tell(**fields, times=round(0.3 * FROZEN_S / PERIOD_S)).dead_man is not frozen
     if frozen:
-        assert "the very same motion" in desk.guarded.trouble
+        assert "repeats the very same motion" in desk.guarded.trouble
         assert not desk.tell(**fields, times=100).dead_man
         desk.assert_needs_a_new_press()
 
@@ -238,7 +253,7 @@ def test_of_a_source_that_plays_only_what_is_no_sample_is_refused() -> None:
     fast = {"velocity": np.full(3, 2 * FASTEST_M_S)}
     assert desk.tell(5.0, **fast, times=200).dead_man
     assert not desk.tell(float("nan")).dead_man
-    assert "samples that are none" in desk.guarded.refusal
+    assert "malformed samples" in desk.guarded.refusal
     assert not desk.tell(5.0).dead_man
     desk.hold(5.0)
 

@@ -180,6 +180,15 @@ def test_after_a_hang_or_a_jump_of_the_clock_it_has_to_be_taken_hold_of_anew(jum
     assert_needs_a_new_press(desk)
 
 
+def test_a_clock_that_is_set_back_lets_nobody_hold_for_ever() -> None:
+    desk = Desk()
+    desk.take_hold()
+    desk.now_s -= 1e6
+    desk.fixture = Engagement(0.1, 0.25)
+    desk.run(SETTLE_S + 0.1)
+    desk.take_hold(0.3, "page-2")
+
+
 # --- numbers no hand makes ------------------------------------------------------------------------
 
 

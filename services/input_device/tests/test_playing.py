@@ -88,9 +88,13 @@ def test_a_stop_that_was_asked_for_holds_for_ever_and_playing_goes_on_where_it_l
 
 
 @pytest.mark.parametrize("after_s", [PERIOD_S, 0.3])
-def test_on_going_on_everybody_has_seen_the_hand_let_go_first(after_s: float) -> None:
+@pytest.mark.parametrize("tells_s", [0.0, 0.5])
+def test_on_going_on_everybody_has_seen_the_hand_let_go_first(
+    after_s: float, tells_s: float
+) -> None:
     desk = Desk()
     desk.begin()
+    desk.robots[0].TELLS_S = tells_s
     desk.robots[0].stop()
     desk.run(after_s)
     desk.playing.go_on(desk.now_s)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hmcs.fixtures.rules import Safeguards
 from hmcs_input_device.press_gate import HANG_S, SETTLE_S, PressGate
 
 PERIOD_S = 0.01
@@ -69,6 +70,11 @@ def test_after_a_hang_or_a_jump_of_the_clock_what_queued_up_is_not_believed(jump
     assert not hand.does(True, times=round(2 * SETTLE_S / PERIOD_S))
     assert "hung or its clock jumped" in hand.gate.trouble
     assert hand.presses_anew()
+
+
+def test_what_is_a_hang_here_is_one_for_the_fixture_too() -> None:
+    assert Safeguards().input_stale_after_s >= HANG_S
+    assert Safeguards().settle_s <= SETTLE_S
 
 
 def test_a_short_delay_is_no_hang() -> None:

@@ -13,6 +13,9 @@ from hmcs.task import Task
 
 FloatArray = NDArray[np.float64]
 
+FASTEST_M_S = 5.0
+"""No hand wants to go faster along any axis: what asks for more is no hand's."""
+
 
 class Led(NamedTuple):
     """What comes of a push."""
@@ -24,11 +27,15 @@ class Led(NamedTuple):
 
 
 class LeadingHand:
-    """Pushes as hard as the arm needs to go as the hand wants; the sensor has the last word."""
+    """Pushes as hard as the arm needs to go as the hand wants; the sensor has the last word.
+
+    A velocity that is none, or is not finite, is no push, and the sensor begins anew after it.
+    """
 
     def __init__(self, admittance: Admittance, payload: Payload, bandwidth_hz: float) -> None:
         self._admittance = admittance
         self._payload = payload
+        self._bandwidth_hz = bandwidth_hz
         self._sensor = ForceSensor(bandwidth_hz)
 
     def push(self, velocity: FloatArray, orientation: FloatArray, elapsed_s: float) -> Led:
@@ -36,6 +43,9 @@ class LeadingHand:
 
         The tool is turned by the quaternion `orientation`, x y z w, base frame.
         """
+        if not (np.abs(velocity).max() <= FASTEST_M_S and elapsed_s >= 0.0):
+            self._sensor = ForceSensor(self._bandwidth_hz)
+            return Led(np.zeros(6), np.zeros(6))
         wanted = self._admittance.wrench(np.concatenate([velocity, np.zeros(3)]))
         reading = self._sensor.read(sensed(wanted, self._payload, orientation), elapsed_s)
         wrench = operator_wrench(reading, self._payload, orientation)

@@ -93,3 +93,39 @@ def test_only_a_cooperative_task_has_a_hand_on_its_robot():
     assert np.linalg.norm(led.wrench[:3]) == pytest.approx(
         2.0 + np.linalg.norm(wanted) / 0.01, rel=0.01
     )
+
+
+@pytest.mark.parametrize(
+    ("velocity", "elapsed_s"),
+    [
+        ([np.nan, 0.0, 0.0], 0.01),
+        ([0.0, np.inf, 0.0], 0.01),
+        ([1e308, -1e308, 1e308], 0.01),
+        ([0.0, 0.0, 5.1], 0.01),
+        ([0.1, 0.0, 0.0], np.nan),
+        ([0.1, 0.0, 0.0], -1.0),
+    ],
+)
+def test_a_push_that_is_none_moves_nothing_and_leaves_no_trace(velocity, elapsed_s):
+    hand = leading_hand(load_task("object-3d"))
+    assert hand is not None
+    wanted = np.array([0.1, -0.05, 0.0])
+    for _ in range(200):
+        hand.push(wanted, UPRIGHT, 0.01)
+    led = hand.push(np.array(velocity), UPRIGHT, elapsed_s)
+    assert not led.twist.any()
+    assert not led.wrench.any()
+    np.testing.assert_allclose(hand.push(wanted, UPRIGHT, 0.01).twist[:3], wanted, atol=1e-4)
+
+
+@given(
+    arrays.arrays(np.float64, 3, elements=st.floats(allow_nan=True, allow_infinity=True)),
+    st.floats(allow_nan=True, allow_infinity=True),
+)
+def test_whatever_is_wanted_the_hand_pushes_finitely(velocity, elapsed_s):
+    hand = leading_hand(load_task("object-3d"))
+    assert hand is not None
+    for _ in range(2):
+        led = hand.push(velocity, UPRIGHT, elapsed_s)
+        assert np.isfinite(led.twist).all()
+        assert np.isfinite(led.wrench).all()
