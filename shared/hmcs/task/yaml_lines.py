@@ -105,7 +105,7 @@ class _BoundedLoader(yaml.SafeLoader):
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose the next value; raises YamlError where a bound is passed."""
-        event = self.peek_event()
+        event = self.peek_event()  # type: ignore[no-untyped-call]
         line, anchor = event.start_mark.line + 1, event.anchor
         alias = isinstance(event, yaml.AliasEvent)
         if not alias and event.tag is not None:
@@ -128,7 +128,7 @@ class _BoundedLoader(yaml.SafeLoader):
                 self._check_number(node, line)
         return node
 
-    def compose_mapping_node(self, anchor: str | None) -> yaml.MappingNode:
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         """Compose a mapping; raises YamlError for a key that is a list or a mapping."""
         node = super().compose_mapping_node(anchor)
         for key, _ in node.value:
