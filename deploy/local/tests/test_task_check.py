@@ -65,11 +65,11 @@ def test_good_demonstrations_agree(folder: Path) -> None:
     assert done.stdout == "task.yaml: in order: 2 gestemes, 2 states; 2 demonstrations agree\n"
 
 
-def test_what_is_told_of_demonstrations_is_told_before_they_agree(folder: Path) -> None:
+def test_findings_about_demonstrations_are_printed_and_refuse_nothing(folder: Path) -> None:
     done = hmcs(folder, "task", "check", "task.yaml", "take-0.csv", "take-1.csv", "take-0.csv")
     assert done.returncode == 0, done.stderr
     assert "take-0.csv: the same samples as take-0.csv: left out" in done.stdout
-    assert done.stdout.endswith("2 demonstrations agree, but for what is told above\n")
+    assert done.stdout.endswith("2 demonstrations agree, apart from the findings above\n")
 
 
 def test_both_refuse_what_no_hand_made_and_training_does_it_if_told_to(folder: Path) -> None:
