@@ -670,7 +670,9 @@ def check(
     shown = ""
     if demonstrations:
         count, told = checked(task, demonstrations, typer.echo)
-        shown = f"; {count} demonstrations agree" + (", but for what is told above" if told else "")
+        shown = f"; {count} demonstrations agree" + (
+            ", apart from the findings above" if told else ""
+        )
     counts = f"{len(task.gestemes)} gestemes, {len(task.states)} states"
     typer.echo(f"{file}: in order: {counts}{shown}")
 

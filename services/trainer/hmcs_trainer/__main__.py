@@ -40,6 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--find-states", action="store_true", help="find states in the motion, without labels"
     )
+    parser.add_argument(
+        "--accept-implausible",
+        action="store_true",
+        help="learn even from what no hand seems to have made: jumps, other units",
+    )
     parser.add_argument("--report", help="the page to write on what the model is worth")
     given = parser.parse_args(words)
     if bool(given.performance) != bool(given.performance_output):
@@ -53,6 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             recognizer=given.recognizer,
             find_states=given.find_states,
             report=given.report,
+            accept_implausible=given.accept_implausible,
             progress=lambda line: print(line, file=sys.stderr),
         )
         if given.performance:

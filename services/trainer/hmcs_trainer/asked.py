@@ -1,7 +1,7 @@
 """What a question may ask for: names that are checked, files that lie in the trainer's own folders.
 
-Anybody on the bus may ask. What is asked is data: it becomes a `Job`, never words of a command line
-and never a path outside the folders that the trainer was given.
+Any process on the bus may ask. Its question is data: it becomes a `Job`, never words of a command
+line, and never a path outside the folders that the trainer was given.
 """
 
 from __future__ import annotations

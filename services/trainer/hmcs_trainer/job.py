@@ -1,7 +1,7 @@
-"""The process of one training: a `Job` on standard input, what is done as lines of JSON on output.
+"""The process of one training: a `Job` on standard input, its progress as lines of JSON on output.
 
-Nothing of what was asked is a word of its command line. What it tells goes to everybody on the bus,
-so it quotes nothing of the files it reads; the whole error is for the log.
+No part of the question is a word of its command line. Its output is published on the bus, so it
+quotes nothing from the files it reads; the complete error goes to standard error, for the log.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ FAILED = 2
 """Exit code where what was asked cannot be done."""
 
 
-def told_to_all(error: UserError, job: Job) -> str:
-    """Return what was wrong without a word of a file that could not be read."""
+def public_message(error: UserError, job: Job) -> str:
+    """Return what was wrong, without quoting a file that could not be read."""
     if isinstance(error, LearningError):
         return error.unquoted
     if isinstance(error, TaskFileError):
@@ -57,7 +57,7 @@ def main() -> int:
         )
     except UserError as error:
         print(error, file=sys.stderr)
-        _tell({"error": told_to_all(error, job)})
+        _tell({"error": public_message(error, job)})
         return FAILED
     return 0
 

@@ -6,7 +6,7 @@ Each limit is taken from the task or from what hands can do:
 |---|---|
 | `JUMP_STEPS` dead zones from one sample to the next | what is shorter than a step or two changes no path that is learned |
 | `HARDEST_M_S2` before and after it | five times gravity; the hardest strokes of a drawing hand reach half of it |
-| `FASTEST` times the robot's speed limit | nobody shows a robot what it could follow at a tenth of the speed only |
+| `FASTEST` times the robot's speed limit | a robot cannot follow what is shown ten times as fast as it moves |
 | `SUDDEN` times the usual speed | where samples are too seldom to tell an acceleration |
 | `FASTEST_TURN_RAD_S`, `LARGEST_TURN_RAD` from one sample to the next | a wrist turns with 20 rad/s at most, and no path of turns is seen at a third of a right angle a sample |
 | `FARTHEST` times across the workspace | no mistake in showing is so large, any mistake of units is |
@@ -45,20 +45,20 @@ Array = NDArray[np.float64]
 
 
 class Finding(NamedTuple):
-    """Something to tell whoever gave the demonstrations."""
+    """Something the author of the demonstrations should know."""
 
     serious: bool
     """Whether nothing is learned because of it."""
     text: str
     """What, where and when, and what to do."""
     may_be_accepted: bool = False
-    """Whether something could be learned nevertheless, if somebody insists."""
+    """Whether a model can be learned nevertheless, with `--accept-implausible`."""
     unquoted: str = ""
     """The text without what a file said instead of a name of the task; empty where it is none."""
 
 
 def implausible(task: Task, demonstration: Demonstration) -> list[Finding]:
-    """Return what no hand does, the first of each kind with its time and how many there are."""
+    """Return what no hand does: the first of each kind with its time, and how many there are."""
     wrong_units = list(_far(task, demonstration))
     # Of positions in other units everything else is a consequence.
     return wrong_units or [

@@ -25,7 +25,7 @@ _DRAWING = re.compile(r"lasa:(?P<shape>[^/]+)/(?P<first>\d{1,6})(?:-(?P<last>\d{
 
 
 class NoMotionError(RecordingError):
-    """A recording in which nobody moved anything; quotes nothing of it."""
+    """A recording without any motion of a hand; its message quotes nothing of the file."""
 
 
 class Source(NamedTuple):
@@ -98,8 +98,8 @@ def _digest(demonstration: Demonstration) -> bytes:
 
 
 def _told_apart(sources: list[Source]) -> list[Source]:
-    """Call demonstrations of files of the same name by the whole reference, so that what is told
-    of one is not taken for another's."""
+    """Name demonstrations of files with equal names by the whole reference, so that a message
+    about one cannot be taken for another's."""
     bare = Counter(path.name for path in {Path(source.reference) for source in sources})
     return [
         source

@@ -1,4 +1,4 @@
-"""A training in a process of its own, and what it says of it."""
+"""A training in a process of its own, and what that process says about it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _JUDGING = "judging"
 _LEARNED_SHARE = 0.5
 """Of the whole, where learning has ended and judging begins."""
 LONGEST_DETAIL = 2_000
-"""Characters of one sentence that is told to all."""
+"""Characters of one published sentence."""
 _COMMAND = (sys.executable, "-m", "hmcs_trainer.job")
 _KILLED_WAIT_S = 10.0
 

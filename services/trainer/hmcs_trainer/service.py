@@ -16,11 +16,11 @@ from hmcs_trainer.settings import TrainerSettings
 
 TOLD_EVERY_S = 0.1
 AGAIN_EVERY_S = 2.0
-"""What is being trained is told again after so long without news, for those who came later."""
+"""The progress is published again after so long without news, for processes that joined later."""
 FORGOTTEN_AFTER_S = 10.0
-"""A trainer that has told nothing for so long trains nothing any more."""
+"""A trainer that has published no progress for so long counts as idle."""
 MOST_ELSEWHERE = 64
-"""So many other trainers are heard at most, whatever names come."""
+"""The progress of so many other trainers is remembered at most."""
 _ENDED = ("done", "failed", "canceled")
 
 
@@ -30,7 +30,7 @@ class _Elsewhere(NamedTuple):
 
 
 class Trainer(Service):
-    """Trains one model at a time: who asks for another meanwhile is refused."""
+    """Trains one model at a time and refuses a second request meanwhile."""
 
     name = "trainer"
     Settings = TrainerSettings

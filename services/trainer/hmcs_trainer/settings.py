@@ -16,7 +16,7 @@ class TrainerSettings(ServiceSettings):
     """Where models and their report pages are written."""
     sources: tuple[Path, ...] = ()
     """Folders, or files, beside `folder`, that recordings, CSV files and task files of a question
-    may lie in. Nothing else is read for anybody who asks over the bus."""
+    may lie in. No other file is read for a question from the bus."""
     longest_s: float = Field(default=3600.0, gt=0.0)
     """A training that takes longer is given up."""
     stop_grace_s: float = Field(default=2.0, gt=0.0)

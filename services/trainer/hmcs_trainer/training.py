@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.bus.keys import check_name
+from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
@@ -55,15 +56,23 @@ def refuse(serious: Sequence[Finding]) -> None:
     )
 
 
-def check_learned(model: Model) -> None:
-    """Raise LearningError for a model that could not be read again: its numbers are none."""
+def sound(learned: Callable[[], Model]) -> Model:
+    """Return the model that is learned, if it is one.
+
+    Raises LearningError where its numbers are none, or there is no way to compute them: settings
+    may have any value.
+    """
     try:
+        model = learned()
         check_model(model)
-    except ValueError as error:
+    except UserError:
+        raise
+    except (ArithmeticError, LookupError, MemoryError, ValueError) as error:
         raise LearningError(
-            f"what was learned is no model: {error}; look at the demonstrations and the settings "
-            "of the recognizer"
+            f"no model can be learned so: {error or type(error).__name__}; look at the "
+            "demonstrations and the settings of the recognizer"
         ) from error
+    return model
 
 
 def train(
@@ -130,18 +139,19 @@ def train(
         chosen = selection.settings
     else:
         chosen = settings_of(kind_named(recognizer), settings or {})
-    model = learn(
-        loaded,
-        demonstrations,
-        chosen,
-        recognizer=recognizer,
-        rng=np.random.default_rng(seed),
-        progress=progress,
+    model = sound(
+        lambda: learn(
+            loaded,
+            demonstrations,
+            chosen,
+            recognizer=recognizer,
+            rng=np.random.default_rng(seed),
+            progress=progress,
+        )
     )
     if found is not None:
         for sentence in write_found(found, task_file):
             progress(sentence)
-    check_learned(model)
     saved = save_model(model._replace(name=name or model.name), output)
     if report is not None:
         progress("judging")

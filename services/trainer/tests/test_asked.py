@@ -1,4 +1,4 @@
-"""What anybody on the bus asks for is data: checked, confined, and never a word of a command."""
+"""What a process on the bus asks for is data: checked, confined, never a word of a command."""
 
 from __future__ import annotations
 

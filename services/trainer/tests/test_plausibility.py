@@ -1,4 +1,4 @@
-"""What no hand made is told with file, time and remedy; what people showed is not."""
+"""Implausible demonstrations get a finding with file, time and remedy; human ones get none."""
 
 from __future__ import annotations
 
@@ -360,7 +360,7 @@ def test_files_of_one_name_are_told_apart_and_learned_from_each(
     assert not (tmp_path / "m.hmcs").exists()
 
 
-def test_what_no_hand_made_is_learned_from_if_somebody_insists(
+def test_implausible_demonstrations_are_learned_from_on_request(
     files: list[str], tmp_path: Path
 ) -> None:
     write_csv(files[1], changed(shown(1), slice(10, 12), np.array([0, 0, 0.4])))

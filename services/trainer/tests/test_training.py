@@ -5,11 +5,13 @@ import re
 import numpy as np
 import pytest
 
+from hmcs.errors import UserError
 from hmcs.motion.demonstrations import read_csv, write_csv
 from hmcs.motion.lasa import read_drawing, shapes
 from hmcs.recognition.model_file import load_model
 from hmcs.task import load_task
 from hmcs_trainer.__main__ import main
+from hmcs_trainer.training import train
 
 TASK = "human-shapes"
 SHAPES = ["GShape", "NShape", "PShape", "JShape", "Snake"]
@@ -102,3 +104,26 @@ def test_a_mistake_ends_with_code_2_and_one_clear_line(arguments, message, tmp_p
     assert re.search(message, error), error
     assert "Traceback" not in error
     assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "temperature=0",
+        "temperature=-4",
+        "prune_nats=nan",
+        "background_quantile=2",
+        "window_factor=-1",
+        "alarm_window_steps=0",
+        "filter.unknown_after=0",
+        "filter.any_state=3",
+        "prior_demonstrations=-2",
+        "alignment_sigma=1e300",
+        "unknown_rise=1e308",
+    ],
+)
+def test_settings_that_make_no_model_are_told_and_nothing_is_written(setting, tmp_path):
+    name, _, value = setting.partition("=")
+    with pytest.raises(UserError), np.errstate(all="ignore"):
+        train(TASK, TWO_OF_EACH, tmp_path / "m.hmcs", settings={name: value})
+    assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,6 @@
 """The zip archive that a model file is: its manifest and its arrays, read within bounds.
 
-A file may come from anybody, so nothing it says of itself is believed before it is counted:
+The origin of a file is unknown, so nothing it declares about itself is trusted before it is checked:
 
 | bound | reason |
 |---|---|

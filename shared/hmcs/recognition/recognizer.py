@@ -61,7 +61,7 @@ class Guarded:
         """Guard a recognizer; `anew` makes the one that takes its place after it raised.
 
         It should be one that may begin in any state. Without it the same recognizer goes on.
-        `tell` is told that one begins anew, and why.
+        `tell` receives a sentence when one begins anew: which step failed, and how.
         """
         self._recognizer = recognizer
         self._anew = anew
@@ -105,12 +105,12 @@ class Guarded:
             self._recognizer = self._anew()
         if not self._told:
             self._tell(f"the recognizer failed ({self._failure}): it begins anew with step {index}")
-        # One that fails at every step is told of once.
+        # One that fails at every step is reported once.
         self._failure, self._told = None, True
 
 
 def _check(recognition: Recognition) -> None:
-    """Raise FloatingPointError for a belief that nobody could act on."""
+    """Raise FloatingPointError for a belief whose numbers are no probabilities."""
     if isinstance(recognition, Recognition):
         belief = recognition.belief
         total = float(np.sum(belief.states)) + belief.unknown

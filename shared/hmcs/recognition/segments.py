@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _LONGEST_LABEL = 64
-"""So much of a label is told: no name of a state is longer."""
+"""Characters of a label that a message quotes: no name of a state is longer."""
 
 
 class LearningError(UserError):

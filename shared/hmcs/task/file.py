@@ -31,9 +31,9 @@ MOST_BYTES = 256 * 1024
 """A task of a hundred states, each with a fixture of its own, takes some 60,000; reading takes up
 to a second for so many."""
 MOST_TOLD = 50
-"""So many mistakes are told of a file; whoever mends those reads on."""
+"""Mistakes that are reported for a file; the others show once these are mended."""
 LONGEST_MESSAGE = 500
-"""Characters of what is told of one mistake, which may quote the file."""
+"""Characters of the message about one mistake, which may quote the file."""
 
 
 class Problem(NamedTuple):
@@ -175,7 +175,7 @@ def _read(file: Path) -> tuple[Task | None, list[Problem]]:
 def _problems(
     file: Path, document: Document, found: Sequence[tuple[Location, str]]
 ) -> list[Problem]:
-    """Return what was found in the order of its lines, and no more of it than is told."""
+    """Return the mistakes in the order of their lines, `MOST_TOLD` of them at most."""
     problems = [
         Problem(str(file), _line(document, location), _dotted(location), _shortened(message))
         for location, message in found[:MOST_TOLD]

@@ -25,7 +25,7 @@ from hmcs.task.values import TWIST_AXES, Distribution, Name, Part
 Location = tuple[str | int, ...]
 
 _MOST_UNKNOWN = 50
-"""So many unknown names are told."""
+"""Unknown names that are reported."""
 
 
 class Task(Part):

@@ -1,6 +1,6 @@
 """YAML with line numbers: what a task file says, and on which line it says it.
 
-A file may come from anybody, so reading it takes a bounded time and memory:
+The origin of a file is unknown, so reading it takes a bounded time and memory:
 
 | bound | reason |
 |---|---|

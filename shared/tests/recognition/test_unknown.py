@@ -57,14 +57,14 @@ def test_of_one_performance_the_threshold_is_four_deviations_of_its_windows_belo
     assert settings.threshold == pytest.approx(windows.mean() - 4.0 * windows.std(), abs=0.02)
 
 
-def test_of_few_performances_the_threshold_is_a_prediction_bound_for_another():
+def test_of_two_performances_the_threshold_is_a_prediction_bound_for_a_third():
     # Each at a level of its own, so that its windows are all alike.
-    levels = np.array([1.0, 1.4, 1.9])
+    levels = np.array([1.0, 1.9])
     settings = learn_alarm([np.full(60, level) for level in levels], 20)
-    student_90 = 1.886
-    bound = levels.mean() - student_90 * levels.std(ddof=1) * np.sqrt(1 + 1 / 3)
-    pooled = np.repeat(levels, 41)
-    assert settings.threshold == pytest.approx(min(bound, pooled.mean() - 4 * pooled.std()))
+    student_90 = 3.078
+    bound = levels.mean() - student_90 * levels.std(ddof=1) * np.sqrt(1 + 1 / 2)
+    assert bound < levels.mean() - 4 * levels.std()
+    assert settings.threshold == pytest.approx(bound)
 
 
 def test_a_bound_from_many_performances_holds_for_nine_in_ten_others():

@@ -133,7 +133,9 @@ def smoothed(model: DurationHmm, log_emission: Array) -> Array:
 
 
 def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
-    """Return the most probable segmentation. Raises as `filtered`."""
+    """Return the most probable segmentation; where entering a state is as probable as staying, it
+    stays. Raises as `filtered`.
+    """
     _check_emission(model, log_emission)
     log_durations, log_transition = log_of(model.durations), log_of(model.transition)
     steps = len(log_emission)

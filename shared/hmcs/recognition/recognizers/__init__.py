@@ -115,9 +115,9 @@ def recognizer_of(
 ) -> Recognizer:
     """Return a fresh recognizer of a model.
 
-    It begins with the task's first state or, with `anywhere`, in any of its states. Where it fails
-    at a step, it raises what went wrong, and with the next step begins anew in any state; `tell`
-    is told so, or the log of this package.
+    It begins with the task's first state or, with `anywhere`, in any of its states. When it fails
+    at a step it raises the error, and with the next step begins anew in any state; `tell` receives
+    a sentence about it, by default the log of this package.
     """
     make = kind_named(model.recognizer).recognizer
     guarded = partial(Guarded, make(model, anywhere), lambda: make(model, True))

@@ -247,8 +247,8 @@ def test_wrong_evidence_of_durations_is_refused(call, message):
 
 
 def test_where_staying_and_entering_are_as_probable_it_stays():
-    # Two steps of the first state, or one and then the second: 1/2 each, to the bit.
-    model = duration_hmm([1.0, 0.0], [[0.0, 1.0], [0.0, 1.0]], [[0.5, 0.5], [1.0, 0.0]])
+    # Two steps of the first state, or one of the second and then the first: 1/4 each, to the bit.
+    model = duration_hmm([0.5, 0.5], [[0.0, 1.0], [1.0, 0.0]], [[0.5, 0.5], [1.0, 0.0]])
     found = decoded(model, np.zeros((2, 2)))
     assert [segment.steps for segment in found.segments] == [2]
-    assert found.log_probability == np.log(0.5)
+    assert found.log_probability == np.log(0.25)
