@@ -20,6 +20,7 @@ def rewritten(
     chunk_bytes: int = 4096,
     chunked: bool = True,
     indexed: bool = True,
+    checksums: bool = True,
     library: str = "another program",
     order: Callable[[Rows], Iterable[Message]] = iter,
     begin: Callable[[Writer], None] = lambda writer: None,
@@ -38,6 +39,7 @@ def rewritten(
             repeat_schemas=indexed,
             use_statistics=indexed,
             use_summary_offsets=indexed,
+            enable_crcs=checksums,
         )
         writer.start("", library)
         begin(writer)

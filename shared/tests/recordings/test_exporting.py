@@ -46,7 +46,7 @@ def test_tables_and_arrays_hold_every_message(
             ["input_motion", "input_motion-2"],
         ),
         (["hmcs/@v1/a/x/y_z", "hmcs/@v1/a/x_y/z"], ["x_y_z", "x_y_z-2"]),
-        (["hmcs/@v1/a/In", "hmcs/@v1/a/in"], ["In", "in-2"]),
+        (["a/b/c/IN", "a/b/c/In", "a/b/c/in"], ["IN", "In-2", "in-3"]),
         (["k", ""], ["k", "unnamed"]),
         (["a/b/c/..", "a/b/c/../../../up"], ["unnamed", "_.._.._up"]),
         (["/etc/passwd", "C:\\x", "a/b/c/d\0e"], ["_etc_passwd", "C__x", "d_e"]),

@@ -105,6 +105,7 @@ def test_a_device_that_is_silent_for_half_a_second_is_gone(
 def test_a_device_that_was_started_anew_begins_a_performance(recorded: Recorded) -> None:
     content = recorded(moving("boot-1", 0, 30), moving("boot-2", 1000, 40, 7.0))
     assert lengths(performances_of(content)) == [30, 40]
+    assert np.abs(np.diff(outlined(content).positions, axis=0)).max() < 0.0015
     for found in (performances_of(content), demonstrations_of(content)):
         assert max(np.abs(np.diff(each.positions, axis=0)).max() for each in found) < 0.0015
 

@@ -112,6 +112,14 @@ def test_bombs_take_little_memory_and_an_end(tmp_path: Path) -> None:
     assert grown < 150
 
 
+def test_chunks_that_lie_about_their_size_cost_no_other(take: Path, tmp_path: Path) -> None:
+    liar = chunk(zstandard.compress(bytes(1000)), 60 * 1024 * 1024, "zstd")
+    data, at = take.read_bytes(), chunks_of(take)[0][0]
+    path = tmp_path / "lies.mcap"
+    path.write_bytes(data[:at] + liar * 5 + data[at:])
+    assert len(read(path).messages) == len(read(take).messages)
+
+
 def test_a_sender_of_many_words_is_cut_short(tmp_path: Path) -> None:
     words = record(12, text("n" * 1000) + text("")[:4])
     path = file_of(tmp_path / "words.mcap", words * 30_000)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -209,15 +210,17 @@ def test_labels_count_on_though_their_recording_is_damaged_or_moved(
     assert states(moved) == ["go"]
 
 
-def test_labels_of_files_without_checksums_or_chunks_know_their_recording(
-    take: Path, tmp_path: Path, maker: Maker, performed: Performed
+@pytest.mark.parametrize("how", [{"chunked": False}, {"checksums": False, "chunk_bytes": 10**9}])
+def test_labels_of_files_without_chunks_or_checksums_know_their_recording(
+    take: Path, tmp_path: Path, maker: Maker, performed: Performed, how: dict[str, Any]
 ) -> None:
-    loose = rewritten(take, tmp_path / "loose.mcap", chunked=False)
-    write_labels(read(loose), [Stretch(BEGUN_NS, BEGUN_NS + 10**9, "old")])
-    assert states(loose) == ["old"]
+    other = rewritten(take, tmp_path / "other.mcap", **how)
+    write_labels(read(other), [Stretch(BEGUN_NS, BEGUN_NS + 10**9, "old")])
+    assert states(other) == ["old"]
     take.unlink()
-    rewritten(maker.write(performed(("turn", "go"), 100)), loose, chunked=False)
-    assert states(loose) == ["turn", "go"]
+    # As long, at the same times.
+    rewritten(maker.write(performed(("gO", "turn"), 100)), other, **how)
+    assert states(other) == ["gO", "turn"]
 
 
 def test_labels_that_were_taken_from_an_empty_recording_are_of_no_other(
