@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -101,7 +102,8 @@ class Guarded:
             raise _NoSampleError(f"gives malformed samples: {where}: {first['msg']}") from None
         if not np.abs(motion.position).max() <= FARTHEST_M:
             raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: check its scale")
-        told = _copied(told)
+        # A device may reuse its arrays.
+        told = deepcopy(told)
         if not self._plays:
             self._doubt(now_s, told)
         return told
@@ -137,15 +139,6 @@ class _NoSampleError(Exception):
 
 class _SilentError(Exception):
     """A source has nothing new to tell."""
-
-
-def _copied(told: DeviceSample) -> DeviceSample:
-    """Return a sample of its own: a device may reuse its arrays."""
-    names = ("position", "velocity", "orientation", "angular_velocity", "wrench")
-    arrays = {name: getattr(told, name) for name in names}
-    return told._replace(
-        **{name: np.array(array) for name, array in arrays.items() if array is not None}
-    )
 
 
 def _works(told: DeviceSample) -> bool:
