@@ -18,13 +18,12 @@ import yaml
 
 from hmcs.whole_files import written_whole
 from hmcs_local.compose import ROUTER, ComposeError, ServiceSpec, StackSpec, load_compose
+from hmcs_secure.containers import USER_ID
 
 Manifest = dict[str, Any]
 
 NAMESPACE = "hmcs"
 STACK = {"app.kubernetes.io/part-of": "hmcs"}
-USER_ID = 10_001
-"""Of the user in the images, see deploy/Dockerfile."""
 STORED = "1Gi"
 """Of each volume; models and recordings of a cell are a fraction of it."""
 _ROUTER_PORT = 7447

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
+from hmcs.bus.rights import roles
 from hmcs_local.compose import ComposeError, find_compose, load_compose
 
 Describe = Callable[..., dict[str, Any]]
@@ -105,3 +106,24 @@ def test_every_port_of_the_stack_is_reached_from_this_machine_alone_by_default()
         for port in service.get("ports", [])
     ]
     assert sorted(ports) == ["127.0.0.1:7447:7447", "127.0.0.1:8080:8080"]
+
+
+def test_in_a_closed_cell_every_service_comes_with_the_certificate_of_its_own_role() -> None:
+    folder = find_compose(Path(__file__)).parent
+    everything = yaml.safe_load((folder / "compose.yaml").read_text())["services"]
+    closed = yaml.safe_load((folder / "compose.secure.yaml").read_text())["services"]
+    on_the_bus = {
+        name for name, it in everything.items() if "HMCS_ROUTER" in it.get("environment", {})
+    }
+    assert set(closed) == on_the_bus | {"router"}
+    for name in on_the_bus:
+        mounted = dict(
+            each.removesuffix(":ro").rsplit(":", 1)[::-1] for each in closed[name]["volumes"]
+        )
+        holder = f"holders/{name.replace('-', '_')}"
+        environment = closed[name]["environment"]
+        assert environment["HMCS_ROUTER"].startswith("tls/router:")
+        assert mounted[environment["HMCS_TLS_CERTIFICATE"]].endswith(f"/{holder}.pem")
+        assert mounted[environment["HMCS_TLS_KEY"]].endswith(f"/{holder}.key")
+        assert mounted[environment["HMCS_TLS_CA"]].endswith("/ca.pem")
+        assert name.replace("-", "_") in roles()

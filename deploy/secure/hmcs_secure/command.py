@@ -24,6 +24,7 @@ from hmcs_secure.authority import (
     utc_now,
 )
 from hmcs_secure.closed_cell import DEFAULT_FOLDER
+from hmcs_secure.containers import open_to_containers
 from hmcs_secure.identity import ROUTER, Identity
 from hmcs_secure.router_file import DEFAULT_LISTEN, write_router_file
 
@@ -125,6 +126,18 @@ def router(
         authority, target, listen=listen, connect=connect or (), instance=instance, files=files
     )
     Console(highlight=False, soft_wrap=True).print(f"{written}: listens on {listen}")
+
+
+@app.command()
+def containers(cell: _Cell, folder: _Folder = DEFAULT_FOLDER) -> None:
+    """Let the containers of compose.secure.yaml use CELL; again after certificates were issued."""
+    authority = _authority(folder, cell)
+    written = open_to_containers(authority, utc_now())
+    Console(highlight=False, soft_wrap=True).print(
+        f"{written}: the router's configuration in its container. Start the stack with "
+        f"`HMCS_CELL={cell} HMCS_SECURE={authority.folder.resolve()} docker compose "
+        "--file compose.yaml --file compose.secure.yaml up`"
+    )
 
 
 @app.command()

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
 
 from hmcs.model_signing import SignatureError, sign_model, signed_by
 from hmcs_secure import command
-from hmcs_secure.authority import AuthorityError, open_authority, utc_now
+from hmcs_secure.authority import AuthorityError, holders_of, open_authority, utc_now
 from hmcs_secure.identity import IdentityError
 
 
@@ -30,12 +32,16 @@ def call(tmp_path: Path):
     return run
 
 
+def configured(file: Path) -> Any:
+    text = file.read_text(encoding="utf-8")
+    return json.loads(re.sub(r"^//.*\n", "", text, flags=re.MULTILINE))
+
+
 def test_a_new_cell_has_a_certificate_for_every_role_and_a_router(call, tmp_path) -> None:
     told = call("init", "lab").output
     assert "Keep" in told
     assert "ca.key" in told
-    text = (tmp_path / "lab" / "router.json5").read_text(encoding="utf-8")
-    configuration = json.loads(re.sub(r"^//.*\n", "", text, flags=re.MULTILINE))
+    configuration = configured(tmp_path / "lab" / "router.json5")
     assert configuration["access_control"]["default_permission"] == "deny"
     assert "every certificate" not in call("check", "lab").output
     assert "lab/robot" in call("check", "lab").output
@@ -55,6 +61,38 @@ def test_what_expires_soon_is_told_and_renewed(call, monkeypatch, tmp_path) -> N
     call("renew", "lab")
     call("check", "lab")
     assert open_authority(tmp_path / "lab").cell == "lab"
+
+
+def test_containers_get_a_router_named_as_theirs_and_keys_of_their_own(
+    call, monkeypatch, tmp_path
+) -> None:
+    owners: dict[Path, int] = {}
+    monkeypatch.setattr(os, "chown", lambda path, user, group: owners.update({path: user}))
+    call("init", "lab", "--host", "robot.example")
+    cell = tmp_path / "lab"
+    assert "compose.secure.yaml" in call("containers", "lab").output
+    holders = holders_of(open_authority(cell))
+    router = next(h for h in holders if h.identity.role == "router")
+    assert {"router", "robot.example", "localhost"} <= set(router.hosts)
+    assert owners == {h.key: 10001 for h in holders}
+    issued = router.certificate.read_bytes()
+    call("containers", "lab")
+    assert router.certificate.read_bytes() == issued
+    configuration = configured(cell / "router.containers.json5")
+    assert configuration["listen"]["endpoints"] == ["tls/0.0.0.0:7447"]
+    credentials = configuration["transport"]["link"]["tls"]
+    assert credentials["root_ca_certificate"] == "/secure/ca.pem"
+    assert credentials["listen_private_key"] == "/secure/holders/router.key"
+
+
+def test_who_may_not_hand_keys_over_is_told_what_to_do(call, monkeypatch) -> None:
+    def refuses(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "chown", refuses)
+    call("init", "lab")
+    with pytest.raises(AuthorityError, match="run this as root"):
+        call("containers", "lab")
 
 
 def test_a_key_that_others_may_read_is_told(call, tmp_path) -> None:
