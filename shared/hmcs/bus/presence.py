@@ -33,10 +33,10 @@ def is_token(keys: Keys, token: str) -> bool:
 
 def present(keys: Keys, tokens: Iterable[str]) -> Present:
     """Return the processes that presence or member tokens stand for."""
-    shown = sorted(set(tokens))
-    possible = tuple(token for token in shown if is_token(keys, token))
+    shown = set(tokens)
+    possible = {token for token in shown if is_token(keys, token)}
     return Present(
         members=tuple(sorted({keys.member_of(token) for token in possible})),
-        tokens=possible,
-        strangers=tuple(token for token in shown if token not in possible),
+        tokens=tuple(sorted(possible)),
+        strangers=tuple(sorted(shown - possible)),
     )

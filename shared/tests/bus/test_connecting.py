@@ -75,7 +75,7 @@ def silent() -> Iterator[str]:
         yield f"tcp/127.0.0.1:{server.getsockname()[1]}"
 
 
-@pytest.mark.parametrize("router", ["tcp/192.0.2.1:7447", "tls/robot.lan:7447", "tcp/router:7447"])
+@pytest.mark.parametrize("router", ["tcp/192.0.2.1:7447", "tcp/router:7447"])
 def test_a_direct_process_that_others_would_not_hear_is_told_so(router) -> None:
     settings = BusSettings(router=router, direct=True)
     with pytest.raises(UserError, match=r"do not reach this one.*--open-to-network"):

@@ -49,6 +49,11 @@ def process(router: str, instance: str, answer: Callable[[], Health]) -> Iterato
             thread.join()
 
 
+def shown(bus: Bus) -> int:
+    found = bus.present(bus.keys.presence("thing"))
+    return len(found.tokens) + len(found.strangers)
+
+
 @pytest.fixture
 def asked(router, capsys, until) -> Iterator[Callable[..., tuple[int, str]]]:
     """Ask how `thing` is while processes and tokens are there; return exit code and output."""
@@ -64,7 +69,7 @@ def asked(router, capsys, until) -> Iterator[Callable[..., tuple[int, str]]]:
             for token in tokens:
                 observer.announce(f"{prefix}/{token}")
             count = len(processes) + len(tokens)
-            until(lambda: len(observer.alive(observer.keys.presence("thing"))) == count)
+            until(lambda: shown(observer) == count)
             code = health.main(["--service", "thing", "--router", router, *words])
             return code, capsys.readouterr().out
 
@@ -116,7 +121,7 @@ def test_where_nobody_is_there_that_is_told(asked) -> None:
 def test_one_that_answers_in_its_place_does_not_make_a_silent_one_healthy(
     asked, router, service, instance
 ) -> None:
-    stranger = Source(service=service, instance=instance, boot="b")
+    stranger = Source.model_construct(service=service, instance=instance, boot="b")
     with Bus.open(BusSettings(router=router), "stranger", "s") as bus:
         key = bus.keys.rpc("thing", "hung", "health")
 
@@ -134,7 +139,7 @@ def test_one_that_answers_in_its_place_does_not_make_a_silent_one_healthy(
 def test_what_nobody_of_the_service_can_have_said_makes_nobody_ill(
     asked, router, service, instance
 ) -> None:
-    stranger = Source(service=service, instance=instance, boot="b")
+    stranger = Source.model_construct(service=service, instance=instance, boot="b")
     with Bus.open(BusSettings(router=router), "stranger", "s") as bus:
         key = bus.keys.rpc("thing", "x", "health")
 
