@@ -17,23 +17,31 @@ import pytest
 
 from hmcs.bus.config import BusSettings
 from hmcs.bus.session import Bus
+from hmcs_secure.closed_cell import ClosedCell
 
 ROOT = Path(__file__).parents[2]
 BUILD_TIMEOUT_S = 900
 COMMAND_TIMEOUT_S = 120
 LABEL = "com.docker.compose"
+CELL = "container-test"
 
 
 class Containers:
-    """One compose project of the stack, reached at a port of its own."""
+    """One compose project of the stack, reached at a port of its own.
 
-    def __init__(self, compose: list[str], port: int) -> None:
+    `closed` is the folder of a cell that the stack is to be closed in.
+    """
+
+    def __init__(self, compose: list[str], port: int, closed: Path | None = None) -> None:
         self.project = f"hmcs-test-{secrets.token_hex(3)}"
-        self.cell = "container-test"
-        self.router = f"tcp/127.0.0.1:{port}"
-        self._compose = [*compose, "--project-name", self.project]
+        self.cell = CELL
+        self.port = port
+        files = ["compose.yaml"] if closed is None else ["compose.yaml", "compose.secure.yaml"]
+        chosen = [word for file in files for word in ("--file", file)]
+        self._compose = [*compose, *chosen, "--project-name", self.project]
         self._environment = {
             **os.environ,
+            **({} if closed is None else {"HMCS_SECURE": str(closed)}),
             "HMCS_ROUTER_PORT": str(port),
             "HMCS_CONSOLE_PORT": str(free_port()),
             "HMCS_CELL": self.cell,
@@ -105,12 +113,25 @@ def free_port() -> int:
 
 
 @pytest.fixture(scope="session")
-def containers() -> Iterator[Containers]:
-    """The stack, built and up; taken down with its volumes afterwards, whatever happened."""
+def built() -> list[str]:
+    """Build the images, once; return the words of compose that work here."""
     if reason := why_no_docker():
         pytest.skip(f"Docker cannot run here: {reason}")
-    stack = Containers(compose_command(), free_port())
-    stack.compose("build", timeout_s=BUILD_TIMEOUT_S)
+    compose = compose_command()
+    Containers(compose, free_port()).compose("build", timeout_s=BUILD_TIMEOUT_S)
+    return compose
+
+
+@pytest.fixture(scope="module")
+def closed_cell() -> ClosedCell | None:
+    """The cell that the stack is closed in; a module of tests may give one."""
+    return None
+
+
+@pytest.fixture(scope="module")
+def containers(built: list[str], closed_cell: ClosedCell | None) -> Iterator[Containers]:
+    """The stack, up; taken down with its volumes afterwards, whatever happened."""
+    stack = Containers(built, free_port(), closed_cell and closed_cell.authority.folder)
     try:
         stack.compose("up", "--detach", "--no-build")
         yield stack
@@ -119,10 +140,16 @@ def containers() -> Iterator[Containers]:
 
 
 @pytest.fixture
-def bus(containers: Containers) -> Iterator[Bus]:
+def bus(containers: Containers, closed_cell: ClosedCell | None) -> Iterator[Bus]:
     """A place on the bus of the containers, outside of them."""
-    settings = BusSettings(router=containers.router, cell=containers.cell, connect_timeout_s=30)
-    with Bus.open(settings, "observer", "container-test") as bus:
+    tls = {} if closed_cell is None else closed_cell.credentials("operator")._asdict()
+    settings = BusSettings(
+        router=f"{'tls' if tls else 'tcp'}/127.0.0.1:{containers.port}",
+        cell=containers.cell,
+        connect_timeout_s=30,
+        **tls,
+    )
+    with Bus.open(settings, "operator", "container-test") as bus:
         yield bus
 
 

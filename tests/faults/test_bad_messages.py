@@ -127,7 +127,7 @@ class Everybody:
         stack.until_ready(*self.services.values())
         self.keys = self.scene.bus.keys
         settings = BusSettings(router=stack.endpoint, cell=CELL)
-        self.stranger = zenoh.open(client_config(settings, 5000))
+        self.stranger = zenoh.open(client_config(settings))
 
     def health(self, service: str) -> Health:
         return self.stack.health(self.services[service])

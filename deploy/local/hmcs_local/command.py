@@ -542,6 +542,7 @@ def replay(
     as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,
     router: _Router = DEFAULT_ROUTER,
     cell: _Cell = "demo",
+    secure: _Secure = None,
 ) -> None:
     """Let a recorded operator move again: in process beside what was believed then, or live.
 
@@ -560,10 +561,12 @@ def replay(
     `_takes_hold_later_ms` `_recorded_lets_go` `_replayed_lets_go` `_lets_go_later_ms`,
     `_times_real`; `notes` on what is missing. null where there is nothing to measure.
     """
+    from hmcs_local.connecting import reached
     from hmcs_local.replays import Files, replay_in_process, replay_live
 
     if live:
-        raise typer.Exit(replay_live(recording, rate, task, router, cell))
+        to = reached("input_device", router, cell, secure)
+        raise typer.Exit(replay_live(recording, rate, task, to))
     console = Console(soft_wrap=True)
     replay_in_process(recording, model, Files(out, picture), console, as_json=as_json)
 

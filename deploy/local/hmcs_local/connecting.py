@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
@@ -19,31 +19,48 @@ from hmcs_secure.router_file import DEFAULT_LISTEN
 _CONNECT_TIMEOUT_S = 3.0
 
 
+class Reached(NamedTuple):
+    """How a process of a role reaches its cell."""
+
+    router: str
+    cell: str
+    tls: dict[str, Any]
+    """The settings tls_ca, tls_certificate and tls_key; empty for a cell without certificates."""
+
+
+def reached(role: str, router: str, cell: str, secure: str | None) -> Reached:
+    """Return how a process of a role reaches a cell.
+
+    `secure` is the name or the folder of a closed cell, in place of `cell`; certificates that lie
+    elsewhere are named by HMCS_TLS_CA, HMCS_TLS_CERTIFICATE and HMCS_TLS_KEY. Raises AuthorityError
+    where the closed cell has no certificate of the role.
+    """
+    if not secure:
+        return Reached(router, cell, dict(tls_files(os.environ)))
+    closed = find_closed_cell(secure)
+    router = DEFAULT_LISTEN if router == DEFAULT_ROUTER else router
+    return Reached(router, closed.name, closed.credentials(role)._asdict())
+
+
 def open_observer(router: str, cell: str, secure: str | None = None) -> Bus:
-    """Join a cell to look at it; see `_join`."""
+    """Join a cell to look at it; see `reached`."""
     return _join(OBSERVER, router, cell, secure)
 
 
 def open_operator(router: str, cell: str, secure: str | None = None) -> Bus:
-    """Join a cell to act for its operator; see `_join`."""
+    """Join a cell to act for its operator; see `reached`."""
     return _join(OPERATOR, router, cell, secure)
 
 
 def _join(role: str, router: str, cell: str, secure: str | None) -> Bus:
     """Join a cell with the rights of a role.
 
-    `secure` is the name or the folder of a closed cell, in place of `cell`; certificates that lie
-    elsewhere are named by HMCS_TLS_CA, HMCS_TLS_CERTIFICATE and HMCS_TLS_KEY. Raises UserError
-    where there is no router, and for names and certificates that cannot be used.
+    Raises UserError where there is no router, and for names and certificates that cannot be used.
     """
-    tls: dict[str, Any] = tls_files(os.environ)
-    if secure:
-        closed = find_closed_cell(secure)
-        cell, tls = closed.name, closed.credentials(role)._asdict()
-        router = DEFAULT_LISTEN if router == DEFAULT_ROUTER else router
+    to = reached(role, router, cell, secure)
     try:
         settings = BusSettings(
-            router=router, cell=cell, connect_timeout_s=_CONNECT_TIMEOUT_S, **tls
+            router=to.router, cell=to.cell, connect_timeout_s=_CONNECT_TIMEOUT_S, **to.tls
         )
     except (ValidationError, KeyNameError) as error:
         reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -31,6 +32,7 @@ from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
 from hmcs.shown import plain
 from hmcs.whole_files import written_whole
+from hmcs_local.connecting import Reached
 
 DRAWN_AS = (".png", ".svg")
 OPEN_LOOP = (
@@ -113,14 +115,15 @@ def _degraded(beliefs: Comparison) -> Iterator[str]:
         )
 
 
-def replay_live(file: Path, rate: float, task: str, router: str, cell: str) -> int:
+def replay_live(file: Path, rate: float, task: str, to: Reached) -> int:
     """Be the input device of a cell that plays a recording; return its exit code."""
     read(file)
     command = [sys.executable, "-m", "hmcs_input_device", "--source", "recording"]
     command += ["--demonstration", str(file), "--speed", str(rate), "--task", task]
-    command += ["--router", router, "--cell", cell]
+    command += ["--router", to.router, "--cell", to.cell]
+    tls = {f"HMCS_{name.upper()}": str(file) for name, file in to.tls.items()}
     try:
-        return subprocess.run(command, check=False).returncode
+        return subprocess.run(command, env=os.environ | tls, check=False).returncode
     except KeyboardInterrupt:
         return 0
 

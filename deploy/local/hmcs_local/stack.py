@@ -229,6 +229,7 @@ class LocalStack:
         return folder
 
     def _run_one_shot(self, spec: ServiceSpec) -> None:
+        before = self._models_of(spec)
         process = self.start(spec.name)
         while process.wait(_ONE_SHOT_LOOK_S) is None:
             self._while_waiting()
@@ -236,7 +237,17 @@ class LocalStack:
         if code := process.exit_code:
             last = "\n".join(f"  {line}" for line in process.last_lines())
             raise OneShotFailedError(f"{spec.name} failed with exit code {code}:\n{last}", code)
+        if self._closed is not None and self._closed.signed_models:
+            self._closed.sign(path for path, _ in self._models_of(spec) - before)
         del self.processes[spec.name]
+
+    def _models_of(self, spec: ServiceSpec) -> set[tuple[Path, int]]:
+        """Every model file in the volumes of a service, and when it was written."""
+        return {
+            (path, path.stat().st_mtime_ns)
+            for volume in spec.volumes.values()
+            for path in self.volume(volume).rglob("*.hmcs")
+        }
 
     def _start(
         self,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from hmcs.model_signing import sign_model
 from hmcs_secure.authority import Authority, AuthorityError, open_authority
 from hmcs_secure.identity import Identity
 from hmcs_secure.router_file import DEFAULT_LISTEN, write_router_file
@@ -62,6 +64,11 @@ class ClosedCell:
         if self.signed_models:
             environment["HMCS_MODEL_KEY"] = str(self.authority.model_key.resolve())
         return environment
+
+    def sign(self, models: Iterable[Path]) -> None:
+        """Sign models that were made by the cell itself."""
+        for model in models:
+            sign_model(model, self.authority.model_signing_key)
 
     def write_router(self, target: Path, listen: str = DEFAULT_LISTEN) -> Path:
         """Write the configuration of its router as it is to be now; return the file."""
