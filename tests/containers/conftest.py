@@ -157,7 +157,7 @@ def bus(containers: Containers, closed_cell: ClosedCell | None) -> Iterator[Bus]
 def pump_until(bus: Bus, containers: Containers) -> Callable[..., None]:
     """Handle what comes from the bus until a condition holds; fails after a while."""
 
-    def pump(condition: Callable[[], Any], within_s: float = 60.0) -> None:
+    def pump(condition: Callable[[], Any], within_s: float = 180.0) -> None:
         deadline_s = time.monotonic() + within_s
         while not condition():
             assert time.monotonic() < deadline_s, f"not in time; logs:\n{containers.logs()}"

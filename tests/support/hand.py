@@ -142,8 +142,10 @@ class Scene:
         """Begin with nobody but a hand; `evidence` as `Watcher` takes it."""
         self.stack = stack
         bus = stack.open_bus("input_device", "hand")
-        stack.watch(bus)
-        self.watcher = Watcher(bus, evidence=evidence)
+        # In a closed cell a hand hears no more than an input device may.
+        looks = bus if stack.closed is None else stack.open_bus("operator", "looks")
+        stack.watch(looks)
+        self.watcher = Watcher(looks, evidence=evidence)
         self.hand = Hand(bus)
         self.bus = bus
 
@@ -164,7 +166,7 @@ class Scene:
         last = steps[-1].index
         self.stack.until(lambda: self.watcher.belief_of(last), within_s=len(steps) / rate_hz + 10.0)
 
-    def drive(self, demonstration: Demonstration, dead_zone_m: float = 0.008) -> None:
+    def drive(self, demonstration: Demonstration, dead_zone_m: float = 0.008) -> Timer:
         """Perform with samples and steps while the bus is pumped, the dead-man held.
 
         Before it the hand rests for a moment with the dead-man released.
@@ -189,6 +191,7 @@ class Scene:
                 self.hand.step(step)
 
         timer = self.bus.every(PERIOD_S, tick)
+        return timer
 
 
 def _interpolated(demonstration: Demonstration, period_s: float) -> NDArray[np.float64]:

@@ -16,9 +16,11 @@ from typing import Any, Self
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Ask, Health
+from hmcs.bus.rights import OPERATOR, roles
 from hmcs.bus.session import Bus, BusSettings
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import with_free_port
+from hmcs_secure.closed_cell import ClosedCell
 
 CELL = "test"
 DEADLINE_S = 60.0
@@ -29,12 +31,14 @@ _LOOK_S = 0.003
 class Stack:
     """Processes on one router. The router is a process of its own, so that it can be killed.
 
-    Buses opened here are pumped while `until` waits; nothing else reads the clock.
+    Buses opened here are pumped while `until` waits; nothing else reads the clock. In a `closed`
+    cell every process and every bus comes with the certificate of its role.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.endpoint = with_free_port("tcp/127.0.0.1:0")
+    def __init__(self, folder: Path, closed: ClosedCell | None = None) -> None:
+        self.folder, self.closed = folder, closed
+        self.cell = CELL if closed is None else closed.name
+        self.endpoint = with_free_port("tcp/127.0.0.1:0" if closed is None else "tls/127.0.0.1:0")
         self.processes: list[StackProcess] = []
         self.present: set[Member] = set()
         """Who is there and ready, once `watch` was called."""
@@ -70,7 +74,11 @@ class Stack:
 
     def start_router(self) -> None:
         """Start the router, on the same port each time."""
-        self.router = self._spawn("router", "router", "hmcs.bus.router", "--listen", self.endpoint)
+        words: tuple[object, ...] = ("--listen", self.endpoint)
+        if self.closed is not None:
+            file = self.closed.write_router(self.folder / "router.json5", self.endpoint)
+            words = ("--config", file)
+        self.router = self._spawn("router", "router", "hmcs.bus.router", *words)
 
     def start(self, service: str, instance: str, *flags: object) -> StackProcess:
         """Start a service on this router; returns at once."""
@@ -78,7 +86,7 @@ class Stack:
             service,
             instance,
             f"hmcs_{service}",
-            *("--router", self.endpoint, "--cell", CELL, "--instance", instance),
+            *("--router", self.endpoint, "--cell", self.cell, "--instance", instance),
             *flags,
         )
 
@@ -108,21 +116,33 @@ class Stack:
             service,
             instance,
             [sys.executable, "-m", module, *map(str, flags)],
-            clean_environment(),
+            clean_environment() | self._certificates(service, instance),
             self.folder / f"{len(self.processes)}-{service}-{instance}.log",
             stop_grace_s=DEADLINE_S,
         )
         self.processes.append(process)
         return process
 
+    def _certificates(self, service: str, instance: str) -> dict[str, str]:
+        if self.closed is None or service not in roles():
+            return {}
+        return self.closed.environment(service, instance)
+
     # --- the bus ----------------------------------------------------------------------------------
 
     def open_bus(self, service: str, instance: str) -> Bus:
         """Open a bus in this process; it is pumped by `until` and closed at the end."""
-        settings = BusSettings(router=self.endpoint, cell=CELL, connect_timeout_s=DEADLINE_S)
+        settings = self.settings(service if service in roles() else OPERATOR)
         bus = self._contexts.enter_context(Bus.open(settings, service, instance))
         self._buses.append(bus)
         return bus
+
+    def settings(self, role: str) -> BusSettings:
+        """Return how a process of a role reaches the others."""
+        tls = {} if self.closed is None else self.closed.credentials(role)._asdict()
+        return BusSettings(
+            router=self.endpoint, cell=self.cell, connect_timeout_s=DEADLINE_S, **tls
+        )
 
     def watch(self, bus: Bus) -> None:
         """Follow on `bus` who is there."""
