@@ -81,13 +81,15 @@ class Stack:
         self.router = self._spawn("router", "router", "hmcs.bus.router", *words)
 
     def start(self, service: str, instance: str, *flags: object) -> StackProcess:
-        """Start a service on this router; returns at once."""
+        """Start a service on this router; returns at once. A word before all flags comes first."""
+        words = flags[:1] if flags and not str(flags[0]).startswith("-") else ()
         return self._spawn(
             service,
             instance,
             f"hmcs_{service}",
+            *words,
             *("--router", self.endpoint, "--cell", self.cell, "--instance", instance),
-            *flags,
+            *flags[len(words) :],
         )
 
     def bring_up(self, service: str, instance: str, *flags: object) -> StackProcess:

@@ -122,19 +122,22 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
         )
 
     last_steps = rpc(("input_device", LAST_STEPS))
-    everything_seen = (
+    shown = (
         keys.motion,
         keys.step,
-        keys.handle,
-        keys.label,
         evidences,
         beliefs,
-        keys.command,
         keys.fixture_state,
-        keys.pairing,
         keys.robot_state,
-        keys.stop_request,
         keys.training,
+    )
+    everything_seen = (
+        *shown,
+        keys.handle,
+        keys.label,
+        keys.command,
+        keys.pairing,
+        keys.stop_request,
     )
     people_ask = rpc(*((service, verb) for verb in VERBS for service in verb.services or (ANY,)))
     return {
@@ -195,7 +198,7 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
         "console": service(
             "console",
             says=(keys.handle, keys.label, keys.stop_request),
-            hears=everything_seen,
+            hears=shown,
             asks=rpc(
                 (ANY, HEALTH),
                 (ANY, DESCRIBE),
