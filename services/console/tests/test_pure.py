@@ -214,7 +214,7 @@ def test_a_label_is_true_from_the_step_the_hand_is_making_now() -> None:
 
 def test_demonstrations_are_told_apart_by_commas_and_blanks() -> None:
     asked = wishes.train(" mine ", "demo", "a.csv, b.csv\n c.hdf5", "")
-    assert (asked.service, asked.verb) == ("trainer", "train")
+    assert (asked.service, asked.verb.name) == ("trainer", "train")
     assert asked.body == Train(
         model="mine", task="demo", demonstrations=("a.csv", "b.csv", "c.hdf5")
     )

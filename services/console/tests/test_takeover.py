@@ -34,7 +34,7 @@ def loaded(active: str = "old", compare_s: float = COMPARE_S) -> Advance:
 
 
 def asked(advance: Advance) -> tuple[str, str] | None:
-    return None if advance.ask is None else (advance.ask.service, advance.ask.verb)
+    return None if advance.ask is None else (advance.ask.service, advance.ask.verb.name)
 
 
 def test_a_newcomer_is_lent_to_the_fixture_then_loaded_then_compared_then_activated() -> None:

@@ -190,7 +190,7 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
 def test_a_link_in_a_forbidden_region_at_the_start_stays_there_and_the_others_are_kept_out(
     starts: dict[str, Pose], period_s: float
 ) -> None:
-    table = region(shape="plane", position_m=[0, 0, 0.45], normal=[0, 0, 1])
+    table = region(shape="plane", position_m=[0, 0, 0.48], normal=[0, 0, 1])
     simulation = Simulation(Scene("puma560", starts["puma560"], (), (table,)), period_s)
     try:
         assert simulation.links_within

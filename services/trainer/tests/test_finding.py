@@ -15,6 +15,7 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.recognition.recognizers import DEFAULT
 from hmcs.recognition.segments import LearningError
+from hmcs.recordings import plain
 from hmcs.recordings.labels import labels_beside, labels_of
 from hmcs.recordings.parts import Preface, Recording
 from hmcs.recordings.reading import RecordingError, read
@@ -265,6 +266,7 @@ def test_a_recording_of_another_version_of_the_contract_is_told(
 ) -> None:
     file = str(maker.write(hand(shown(1).positions)))
     monkeypatch.setattr(Motion, "VERSION", 9)
+    monkeypatch.delitem(plain.BY_SCHEMA, "motion/1")
     assert "has motion/1, expected motion/9: it was recorded with version 1.2.3" in refused(
         [file], tmp_path
     )

@@ -167,7 +167,7 @@ def test_gaps_are_counted_for_each_boot_and_duplicates_are_no_loss(raw) -> None:
     put, receiver, got = raw
     for data in (
         *map(numbered, (5, 6, 9, 9, 7, 10)),
-        *(numbered(seq, "another boot") for seq in (0, 1, 4)),
+        *(numbered(seq, "another-boot") for seq in (0, 1, 4)),
         numbered(11),
     ):
         put(data)

@@ -191,7 +191,7 @@ def test_a_stray_step_right_after_catching_up_takes_nothing_over() -> None:
     bus = FakeBus(kept=range(50))
     listener = Listener(bus)
     bus.hear(0, instance="b", boot="other")
-    bus.hear(0, instance="a", boot="the same name, another boot")
+    bus.hear(0, instance="a", boot="another-boot-of-the-same-name")
     bus.hear(50)
     assert listener.steps == [*range(45, 51)]
     assert set(listener.clocks) == {"boot-1"}

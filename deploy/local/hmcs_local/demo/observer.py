@@ -50,7 +50,7 @@ class ObserverSettings(ServiceSettings):
 class Observer(Service):
     """Records motion, steps, beliefs, commands, fixture and robot until it is stopped."""
 
-    name = "observer"
+    name = "demo_observer"
     Settings = ObserverSettings
     settings: ObserverSettings
 

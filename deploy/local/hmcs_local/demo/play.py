@@ -16,6 +16,7 @@ from hmcs.bus.session import Bus
 from hmcs.bus.verbs import HEALTH
 from hmcs_local.connecting import open_observer
 from hmcs_local.demo.cpu import CpuMeter
+from hmcs_local.demo.observer import Observer
 from hmcs_local.demo.progress import PROGRESS, Progress, ProgressLine
 from hmcs_local.demo.truth import RunError
 from hmcs_local.observer import Sighting, look
@@ -162,7 +163,7 @@ class _Run:
 def _observer(stack: LocalStack, recording: Path) -> Iterator[StackProcess]:
     environment = {k: v for k, v in os.environ.items() if not k.startswith("HMCS_")}
     process = StackProcess(
-        "observer",
+        Observer.name,
         "observer",
         (
             *(sys.executable, "-m", "hmcs_local.demo.observer", "--instance", "observer"),
@@ -181,7 +182,7 @@ def _observer(stack: LocalStack, recording: Path) -> Iterator[StackProcess]:
 def _input_settings(plan: Plan) -> dict[str, str]:
     waited_for = [
         *["gesteme_classifier"] * CLASSIFIERS,
-        *("task_hmm", "fixture_controller", "robot", "observer"),
+        *("task_hmm", "fixture_controller", "robot", Observer.name),
     ]
     return {
         "HMCS_SOURCE": "recorded",
