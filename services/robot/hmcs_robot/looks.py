@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
 
-_MESH = re.compile(r'filename\s*=\s*"([^"]+)"')
-_PACKAGE = "package://"
+from hmcs.errors import UserError
+
+_IN_PACKAGE = ("package", "model")
+"""Schemes of names that begin with the name of a folder, which may be anywhere above."""
 
 
 class Looks(NamedTuple):
@@ -23,15 +27,50 @@ class Looks(NamedTuple):
 def looks_of(urdf: Path, joints: tuple[str, ...]) -> Looks:
     """Return the looks of the arm described in a file.
 
-    Names that lead to no file beside it are left out: who draws it does without.
+    Names that lead to no file are left out, see `missing_meshes`. Raises UserError for a file that
+    is no XML.
     """
-    text = urdf.read_text(encoding="utf-8")
     files: dict[str, bytes] = {}
-    for name in dict.fromkeys(_MESH.findall(text)):
-        mesh = urdf.parent / name.removeprefix(_PACKAGE)
-        if mesh.is_file():
-            files[name] = mesh.read_bytes()
-            material = mesh.with_suffix(".mtl")
-            if material.is_file():
-                files[str(Path(name).with_suffix(".mtl"))] = material.read_bytes()
-    return Looks(text, joints, files)
+    for name in _named(urdf):
+        mesh = _found(urdf, name)
+        if mesh is None:
+            continue
+        files[name] = mesh.read_bytes()
+        material = mesh.with_suffix(".mtl")
+        if material.is_file():
+            files[str(Path(name).with_suffix(".mtl"))] = material.read_bytes()
+    return Looks(urdf.read_text(encoding="utf-8"), joints, files)
+
+
+def missing_meshes(urdf: Path) -> tuple[str, ...]:
+    """Return the names in a description that lead to no file: nobody can draw what they mean."""
+    return tuple(name for name in _named(urdf) if _found(urdf, name) is None)
+
+
+def _named(urdf: Path) -> tuple[str, ...]:
+    """The names of meshes and textures in a description, each once."""
+    try:
+        root = ElementTree.parse(urdf).getroot()
+    except ElementTree.ParseError as error:
+        raise UserError(f"{urdf}: is no URDF: {error}") from error
+    named = (each.get("filename") for tag in ("mesh", "texture") for each in root.iter(tag))
+    return tuple(dict.fromkeys(name for name in named if name))
+
+
+def _found(urdf: Path, name: str) -> Path | None:
+    """The file that a name in a description means, if there is one."""
+    return next((place for place in _places(urdf, name) if place.is_file()), None)
+
+
+def _places(urdf: Path, name: str) -> Iterator[Path]:
+    scheme, host, path, *_ = urlsplit(name)
+    if scheme == "file":
+        yield Path(unquote(path))
+    elif scheme in _IN_PACKAGE:
+        inside = unquote(path).lstrip("/")
+        for above in urdf.resolve().parents:
+            yield above / host / inside
+            if above.name == host:
+                yield above / inside
+    else:
+        yield urdf.parent / name

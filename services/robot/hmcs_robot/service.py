@@ -36,7 +36,7 @@ from hmcs_robot.channel import (
     writer_id,
 )
 from hmcs_robot.control_room import ControlRoom, ControlRoomError
-from hmcs_robot.looks import looks_of
+from hmcs_robot.looks import looks_of, missing_meshes
 from hmcs_robot.robots import ROBOTS
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.supervision import Order
@@ -88,6 +88,12 @@ class Robot(Service):
             self.log.warning(
                 "links that reach into a forbidden region at the start are not kept out of it",
                 extra={"links": ", ".join(self._room.links_within)},
+            )
+        missing = missing_meshes(ROBOTS[self._task.robot.model].urdf)
+        if missing:
+            self.log.warning(
+                "meshes that the URDF names and nobody can draw: there is no such file",
+                extra={"meshes": ", ".join(missing)},
             )
         bus.every(SIGN_EVERY_S, self._give_sign)
         self._room.read(self._take_snapshot, lambda: bus.soon(self._on_end))
