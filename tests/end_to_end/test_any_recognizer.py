@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hmcs.bus.keys import recognizer_in
 from hmcs.bus.messages import Belief
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
@@ -32,8 +33,11 @@ def taught(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Model, P
 
 
 def said(scene: Scene, name: str) -> list[Belief]:
-    key = scene.bus.keys.belief(name)
-    return [received.body for received in scene.watcher.beliefs if received.key == key]
+    return [
+        received.body
+        for received in scene.watcher.beliefs
+        if recognizer_in(received.key).model == name
+    ]
 
 
 def test_every_recognizer_says_over_the_bus_what_it_says_in_process(

@@ -20,6 +20,8 @@ def test_a_shadow_is_activated_without_a_gap(
         "fixture_controller",
         "f",
         *("--models", f'["{model_file}", "{shadow_model_file}"]', "--active-model", "human-shapes"),
+        # The hand is of this thread, which asks and waits.
+        *("--input-stale-after-ms", 500),
     )
     patient = ("--deadline-ms", 80)
     stack.until_ready(
@@ -34,7 +36,8 @@ def test_a_shadow_is_activated_without_a_gap(
     before = len(watcher.fixture)
     assert {r.body.model for r in watcher.fixture if r.body.state} == {"human-shapes"}
     believed = {r.key for r in watcher.beliefs}
-    assert believed == {scene.bus.keys.belief(name) for name in ("human-shapes", "shadow")}
+    keys = scene.bus.keys
+    assert believed == {keys.belief("human-shapes", "t"), keys.belief("shadow", "shadow")}
 
     key = scene.bus.keys.rpc("fixture_controller", "f", "activate")
     (answer,) = scene.bus.ask(key, ActivateRecognizer(model="shadow"), Done)
