@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from enum import Enum, auto
 
 import msgpack
 import numpy as np
@@ -63,7 +64,13 @@ def wire(**fields: object) -> bytes:
     return packed
 
 
-LEFT_OUT = object()
+class LeftOut(Enum):
+    """What stands for a field that is not there."""
+
+    FIELD = auto()
+
+
+LEFT_OUT = LeftOut.FIELD
 
 
 @pytest.mark.parametrize(
