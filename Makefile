@@ -11,7 +11,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench peers test-browser pictures schemas manifests fuzz test-containers clean
+.PHONY: help setup demo test lint bench safety peers test-browser pictures schemas manifests fuzz test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -32,6 +32,10 @@ lint: $(READY) ## put the code in the house's format and name what is left to me
 
 bench: $(READY) ## measure speed and recognition in full, each against its goal; some fifteen minutes
 	@PYTHONPATH=tests $(RUN)/python -m bench
+
+safety: $(READY) ## measure what keeps the robot safe, a thousand faults among it; some three hours
+	@for what in regions gap tls memory faults "faults --hogs 8"; do \
+	  PYTHONPATH=tests $(RUN)/python -m safety $$what || failed=1; done; exit $${failed:-0}
 
 peers: $(READY) ## install the libraries that studies compare with, beside the rest
 	@$(UV) sync --frozen --quiet --group peers --python $(RUN)/python

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import signal
 import time
@@ -118,24 +119,22 @@ class Descent:
         self.stack, self.shape = stack, shape
         self._random = random
         file = write_task(shape, folder)
+        self._file = file
         self._task: Task = load_task(file)
         self._regions, self._tool = regions_of(self._task), tool_shape_of(self._task)
-        self._model = folder / f"{shape}.hmcs"
+        self.model = folder / f"{shape}.hmcs"
         down = np.array([[0.0, 0, 0], [0, 0, -0.2]])
-        save_model(line_model("down", self._task, down), self._model)
+        save_model(line_model("down", self._task, down), self.model)
         bus = stack.open_bus("observer", "looks")
         stack.watch(bus)
         self.watcher = Watcher(bus)
         self.robot = stack.start("robot", "robot", "--task", file)
-        self.fixture = self._start_fixture(0)
-        path = folder / f"{shape}.csv"
-        write_csv(path, down_and_up())
+        self.fixture = self.start_fixture("fixture-0")
+        self._path = folder / f"{shape}.csv"
+        write_csv(self._path, down_and_up())
         stack.until_ready(self.robot, self.fixture, within_s=60.0)
-        hand = stack.start(
-            "input_device", "hand", "--task", file, "--source", "recorded",
-            "--demonstration", path, "--lead-in-s", 0.5, "--repeat", 0, "--re-engage",
-        )  # fmt: skip
-        stack.until_ready(hand, within_s=60.0)
+        self.hand = self.start_hand("hand")
+        stack.until_ready(self.hand, within_s=60.0)
         settings = BusSettings(router=stack.endpoint, cell=CELL, connect_timeout_s=15.0)
         self._stranger = zenoh.open(client_config(settings))
         self._count = 0
@@ -215,10 +214,23 @@ class Descent:
             self.fixture.send(signal.SIGCONT)
         elif how != "flooded":
             self._count += 1
-            self.fixture = self._start_fixture(self._count)
+            self.fixture = self.start_fixture(f"fixture-{self._count}")
             self.stack.until_ready(self.fixture, within_s=60.0)
 
-    def _start_fixture(self, number: int) -> StackProcess:
+    def start_fixture(self, instance: str) -> StackProcess:
+        """Start a fixture controller for the region."""
         return self.stack.start(
-            "fixture_controller", f"fixture-{number}", "--models", json.dumps([str(self._model)])
+            "fixture_controller", instance, "--models", json.dumps([str(self.model)])
         )
+
+    def start_hand(self, instance: str) -> StackProcess:
+        """Start the hand that goes down and up, over and over, and takes hold again by itself."""
+        return self.stack.start(
+            "input_device", instance, "--task", self._file, "--source", "recorded",
+            "--demonstration", self._path, "--lead-in-s", 0.5, "--repeat", 0, "--re-engage",
+        )  # fmt: skip
+
+    def flood(self, messages: int) -> None:
+        """Send so many messages without sense at once."""
+        for what in itertools.islice(self._floods(), messages):
+            self._stranger.put(*what)

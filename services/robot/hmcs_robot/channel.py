@@ -72,6 +72,8 @@ class Snapshot(NamedTuple):
     limited: tuple[str, ...]
     region_distance_m: float | None
     late_ticks: int
+    command_age_s: float | None
+    """Since the last order was taken; None before the first."""
     taken: int
     """Number of the order that was taken last; −1 before the first."""
     late_orders: int

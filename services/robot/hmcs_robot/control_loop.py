@@ -57,6 +57,7 @@ class ControlLoop:
         self._motion = Motion(np.zeros_like(self._posture), Standing(), ())
         self._done_ns = now_ns
         self._taken = -1
+        self._taken_ns: int | None = None
         self._refused = self._refused_at_taken = 0
         self._late_ticks = self._late_orders = self._foreign_orders = 0
 
@@ -114,6 +115,7 @@ class ControlLoop:
             motion.limited,
             float(distances.min()) + margin_m if len(distances) else None,
             self._late_ticks,
+            self._command_age_s(),
             self._taken,
             self._late_orders,
             self._foreign_orders,
@@ -124,12 +126,17 @@ class ControlLoop:
             self._supervision, numbered.order, now_ns, self._rules.policy
         )
         if verdict == "accepted":
-            self._taken = numbered.number
+            self._taken, self._taken_ns = numbered.number, now_ns
             self._refused_at_taken = self._refused
         elif verdict == "late":
             self._late_orders += 1
         else:
             self._foreign_orders += 1
+
+    def _command_age_s(self) -> float | None:
+        if self._taken_ns is None:
+            return None
+        return max(self._done_ns - self._taken_ns, 0) / 1e9
 
     def _cycle(self, now_ns: int) -> None:
         self._supervision = tick(

@@ -254,6 +254,7 @@ class Robot(Service):
             limited=snapshot.limited,
             region_distance_m=snapshot.region_distance_m,
             late_ticks=snapshot.late_ticks,
+            command_age_s=snapshot.command_age_s,
         )
 
     def _looks(self, _: Ask) -> RobotLooks:

@@ -134,6 +134,7 @@ EXAMPLES: tuple[Message, ...] = (
         limited=("speed", "joint_3"),
         region_distance_m=0.125,
         late_ticks=2,
+        command_age_s=0.0078125,
     ),
     Handle(
         operator="page-1",

@@ -305,6 +305,8 @@ class RobotState(Message):
     is none within reach of the search."""
     late_ticks: Count = 0
     """Control ticks that came later than a period after they were due, since the robot started."""
+    command_age_s: Annotated[float, Field(ge=0), Within(LARGEST)] | None = None
+    """Since the last command was taken, by the robot's own clock; None before the first."""
 
 
 # --- the slow loop: steps, evidence, belief -------------------------------------------------------
