@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from browser.viewing import TASK, Cell, Viewer
-from support.stack import Stack
+from support.stack import PATIENT_ROBOT, Stack
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
@@ -29,7 +29,7 @@ PATIENT_MS = 400
 FOLLOWING = (
     # A browser without graphics hardware leaves them little of the machine; whether they stop in
     # time for one another is for other tests to show.
-    ("robot", "--task", TASK, "--hang-s", PATIENT_MS / 1e3),
+    ("robot", "--task", TASK, *PATIENT_ROBOT),
     (
         "fixture_controller",
         *("--input-stale-after-ms", PATIENT_MS, "--command-valid-for-ms", PATIENT_MS),

@@ -17,7 +17,7 @@ from hmcs.recordings.guiding import Guided, guided
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import kept_model, replayed
 from support.hand import PERIOD_S, Watcher
-from support.stack import Stack
+from support.stack import PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """Two shapes and a switch between them."""
@@ -45,7 +45,7 @@ def test_with_the_same_model_the_fixture_would_have_done_what_it_did(
     watcher = Watcher(bus, evidence=False)
     models = ("--models", json.dumps([str(model_file)]))
     stack.until_ready(
-        stack.start("robot", "r", "--hang-s", 0.5),
+        stack.start("robot", "r", *PATIENT_ROBOT),
         stack.start("fixture_controller", "f", *models, *PATIENT),
         stack.start("recognizer", "r", "--model", model_file),
     )

@@ -14,7 +14,7 @@ from hmcs.motion.steps import Step
 from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
 from support.hand import Watcher
-from support.stack import Stack
+from support.stack import PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """How much of the performance is watched: two shapes and a switch between them."""
@@ -35,7 +35,7 @@ def perform(stack: Stack, performance_file: Path) -> Perform:
         watcher = Watcher(bus)
         models = [("--model", file) for file in model_files]
         stack.until_ready(
-            stack.start("robot", "r", "--hang-s", 0.5),
+            stack.start("robot", "r", *PATIENT_ROBOT),
             stack.start(
                 "fixture_controller",
                 "f",
@@ -132,7 +132,7 @@ def test_a_simulated_operator_closes_the_loop_through_the_bus(
         )
     models = json.dumps([str(model_file)] if guided else [])
     stack.until_ready(
-        stack.start("robot", "r", "--hang-s", 0.5),
+        stack.start("robot", "r", *PATIENT_ROBOT),
         stack.start("fixture_controller", "f", "--models", models, *PATIENT),
         *recognizers,
     )

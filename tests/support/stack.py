@@ -25,6 +25,8 @@ from hmcs_secure.closed_cell import ClosedCell
 CELL = "test"
 DEADLINE_S = 60.0
 """What has not come about after so long never will."""
+PATIENT_ROBOT = ("--hang-s", 0.5, "--command-valid-for-ms", 500, "--late-tick-s", 0.5)
+"""Of a robot whose way is looked at, not its stops: a machine that stands still is no fault."""
 _LOOK_S = 0.003
 
 

@@ -30,7 +30,7 @@ STANDS_WITHIN_S = 0.250
 STANDING_M_S = 0.002
 MOVING_M_S = 0.05
 
-_WATCHED_S = 0.35
+_WATCHED_S = 0.45
 """How long the robot is looked at after the fault."""
 _CIRCLE_M, _PASS_S, _LEAD_IN_S = 0.03, 1.2, 0.35
 _PASSES = 10
@@ -55,9 +55,16 @@ class Trial(NamedTuple):
     @property
     def good(self) -> bool:
         """Whether the robot did what it must."""
+        return self.good_within(1.0)
+
+    def good_within(self, times: float) -> bool:
+        """Whether it did, in so many times the time it has.
+
+        A state comes late to whoever looks on a machine that has other work.
+        """
         return (
-            self.commanded_zero_s <= COMMANDED_ZERO_WITHIN_S
-            and self.standing_s <= STANDS_WITHIN_S
+            self.commanded_zero_s <= times * COMMANDED_ZERO_WITHIN_S
+            and self.standing_s <= times * STANDS_WITHIN_S
             and self.resumed == "re-engaged"
         )
 
