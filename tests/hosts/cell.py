@@ -37,6 +37,7 @@ class SpreadCell:
         self.processes: dict[str, StackProcess] = {}
         self.routers: dict[str, StackProcess] = {}
         self.states: list[Received[RobotState]] = []
+        self._fresh_from = 0
         self.motions: list[Received[Motion]] = []
         self.beliefs: list[Received[Belief]] = []
         self._buses: dict[str, Bus] = {}
@@ -65,9 +66,13 @@ class SpreadCell:
             process.wait(DEADLINE_S)
 
     def start_router(self, host: str) -> None:
-        """Start the router of a host; it looks for those of the other hosts by itself."""
+        """Start the router of a host, which dials those of the hosts after it in `HOSTS`.
+
+        Of two routers one dials, again and again: the one whose address may change. Where both do,
+        the one that is accepted does not dial anew when the other can no longer reach it.
+        """
         here = self.network.hosts[host]
-        others = [self.network.hosts[name] for name in HOSTS if name != host]
+        others = [self.network.hosts[name] for name in HOSTS[HOSTS.index(host) + 1 :]]
         configuration = {
             "mode": "router",
             "listen": {"endpoints": [f"tcp/0.0.0.0:{PORT}"], "exit_on_failure": True},
@@ -107,10 +112,25 @@ class SpreadCell:
             self.look()
 
     def forget(self) -> None:
-        """Forget what was seen so far."""
-        self.states.clear()
-        self.motions.clear()
+        """Look at what comes from here on."""
+        self._fresh_from = len(self.states)
         self.beliefs.clear()
+
+    @property
+    def fresh_states(self) -> list[Received[RobotState]]:
+        """The robot's states since `forget`."""
+        return self.states[self._fresh_from :]
+
+    def released_since_it_stood(self) -> bool:
+        """Whether the hand let go after the robot stopped the last time."""
+        stopped = [k for k, received in enumerate(self.states) if received.body.stop != "none"]
+        if not stopped:
+            return True
+        begin = stopped[-1]
+        while begin > 0 and self.states[begin - 1].body.stop != "none":
+            begin -= 1
+        stood_ns = self.states[begin].received_ns
+        return any(m.received_ns > stood_ns and not m.body.dead_man for m in self.motions)
 
     def moves(self) -> bool:
         """Whether the robot moves now."""

@@ -34,10 +34,8 @@ def comes_back(cell: SpreadCell) -> None:
     """Wait until the robot moves and is assisted by fresh beliefs."""
     cell.forget()
     cell.until(lambda: cell.moves() and cell.believes())
-    # A re-engage before it, never motion out of a stop: the operator was seen to let go.
-    assert any(not received.body.dead_man for received in cell.motions) or not any(
-        received.body.stop != "none" for received in cell.states
-    )
+    # Never motion out of a stop without a re-engage: the operator was seen to let go.
+    assert cell.released_since_it_stood()
 
 
 def test_the_stack_works_over_three_hosts_that_are_far_from_each_other(cell: SpreadCell) -> None:
@@ -71,9 +69,9 @@ def test_a_robot_cut_off_from_everybody_stands_until_it_is_reached_again(cell: S
         cell.until(lambda: cell.states[-1].body.stop != "none")
         cell.forget()
         cell.look_for(STILL_FOR_S)
-        assert len(cell.states) > 50
-        assert all(received.body.stop != "none" for received in cell.states)
-        assert not any(np.any(received.body.reference_twist) for received in cell.states)
+        assert len(cell.fresh_states) > 50
+        assert all(received.body.stop != "none" for received in cell.fresh_states)
+        assert not any(np.any(received.body.reference_twist) for received in cell.fresh_states)
     finally:
         for other in ("operator", "recognizers"):
             cell.network.heal("robot", other)
