@@ -15,7 +15,7 @@ from hmcs.errors import UserError
 from hmcs_robot.channel import Channel, Closed, Snapshot, unpack_snapshot
 from hmcs_robot.settings import RobotSettings
 
-READY_WITHIN_S = 60.0
+READY_WITHIN_S = 120.0
 """An arm that is not there by then will not come: a simulation takes a second or two."""
 _ENDS_WITHIN_S = 3.0
 _LOOK_EVERY_S = 0.5
