@@ -9,13 +9,9 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from fuzz.campaign import MODEL, Besieged
-from hmcs.task import load_task
-from hmcs_trainer.performance import perform
-from hmcs_trainer.training import train
+from fuzz.campaign import Besieged
 from support.stack import Stack
-
-SHAPES = ("GShape", "NShape", "PShape", "JShape", "Snake")
+from support.taught import taught
 
 
 def main() -> int:
@@ -28,10 +24,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="hmcs-fuzz-") as name, Progress() as progress:
         folder = Path(name)
         task = progress.add_task("hostile messages", total=arguments.messages)
-        model = folder / "models" / f"{MODEL}.hmcs"
-        train(MODEL, [f"lasa:{shape}/1-5" for shape in SHAPES], model)
-        performance = folder / "performance.csv"
-        perform(load_task(MODEL), [f"lasa:{s}/{k}" for k in (6, 7) for s in SHAPES], performance)
+        model, performance = taught(folder)
         with (
             Stack(folder / "logs") as stack,
             Besieged(stack, folder, model, performance) as besieged,

@@ -17,8 +17,9 @@ from hmcs.bus.config import BusSettings, client_config
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.verbs import HEALTH
 from support.stack import CELL, Stack
+from support.taught import MODEL
 
-MODEL = "human-shapes"
+
 BURST = 200
 """Messages sent at a time before the stack is looked at."""
 ANSWERS_WITHIN_S = 30.0

@@ -223,9 +223,17 @@ def measure(trials: int, seed: int, hogs: int, progress: Progress) -> list[Figur
         Figure("faults", len(seen)),
         Figure("violations", sum(bool(each.violations) for each in seen), at_most=0),
         Figure(
-            "reference not zero after the last command, worst", max(moved_ms), "ms", at_most=120
+            "reference not zero after the last command, worst",
+            max(moved_ms),
+            "ms",
+            at_most=1e3 * COMMANDED_ZERO_WITHIN_S,
         ),
-        Figure("moving after the last command, worst", max(coasted_ms), "ms", at_most=250),
+        Figure(
+            "moving after the last command, worst",
+            max(coasted_ms),
+            "ms",
+            at_most=1e3 * STANDS_WITHIN_S,
+        ),
     ]
 
 

@@ -16,13 +16,9 @@ from fuzz.campaign import Besieged
 from hmcs.bus.messages import Ask
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import HEALTH
-from hmcs.task import load_task
-from hmcs_trainer.performance import perform
-from hmcs_trainer.training import train
 from support.stack import Stack
+from support.taught import taught
 
-MODEL = "human-shapes"
-SHAPES = ("GShape", "NShape", "PShape", "JShape", "Snake")
 MB_AN_HOUR = 1.0
 _WARM_UP_SHARE = 0.3
 """What a process takes in its first minutes it keeps: caches, histories of bounded length."""
@@ -35,9 +31,7 @@ def measure(minutes: float, progress: Progress) -> list[Figure]:
     done = progress.add_task("memory", total=60 * minutes)
     with tempfile.TemporaryDirectory(prefix="hmcs-memory-") as name:
         folder = Path(name)
-        model, performance = folder / "models" / f"{MODEL}.hmcs", folder / "performance.csv"
-        train(MODEL, [f"lasa:{shape}/1-5" for shape in SHAPES], model)
-        perform(load_task(MODEL), [f"lasa:{s}/{k}" for k in (6, 7) for s in SHAPES], performance)
+        model, performance = taught(folder)
         with (
             Stack(folder / "logs") as stack,
             Besieged(stack, folder, model, performance) as at_work,
