@@ -11,12 +11,14 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from hmcs.bus.config import BusSettings
-from hmcs.bus.session import Bus
+from hmcs.bus.messages import Belief, FixtureState, RobotState
+from hmcs.bus.session import Bus, Received
 from hmcs_secure.closed_cell import ClosedCell
 
 ROOT = Path(__file__).parents[2]
@@ -24,6 +26,14 @@ BUILD_TIMEOUT_S = 900
 COMMAND_TIMEOUT_S = 120
 LABEL = "com.docker.compose"
 CELL = "container-test"
+
+
+class Assisted(NamedTuple):
+    """What was heard first of a robot that moves and is guided."""
+
+    belief: Belief
+    guiding: FixtureState
+    moving: RobotState
 
 
 class Containers:
@@ -164,3 +174,24 @@ def pump_until(bus: Bus, containers: Containers) -> Callable[..., None]:
             bus.pump(0.05)
 
     return pump
+
+
+@pytest.fixture
+def assisted(bus: Bus, pump_until: Callable[..., None]) -> Assisted:
+    """Wait until the robot moves, the fixture guides and a belief is heard; return the first."""
+    beliefs: list[Received[Belief]] = []
+    guiding: list[Received[FixtureState]] = []
+    moving: list[Received[RobotState]] = []
+    bus.subscribe(Belief, bus.keys.belief(), beliefs.append)
+    bus.subscribe(
+        FixtureState,
+        bus.keys.fixture_state,
+        lambda got: guiding.append(got) if got.body.reason == "guiding" else None,
+    )
+    bus.subscribe(
+        RobotState,
+        bus.keys.robot_state,
+        lambda got: moving.append(got) if np.linalg.norm(got.body.tool_twist[:3]) > 0.02 else None,
+    )
+    pump_until(lambda: beliefs and guiding and moving)
+    return Assisted(beliefs[0].body, guiding[0].body, moving[0].body)

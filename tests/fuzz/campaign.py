@@ -19,7 +19,6 @@ from hmcs.bus.verbs import HEALTH
 from support.stack import CELL, Stack
 from support.taught import MODEL
 
-
 BURST = 200
 """Messages sent at a time before the stack is looked at."""
 ANSWERS_WITHIN_S = 30.0
