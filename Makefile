@@ -23,7 +23,7 @@ demo: $(READY) ## teach the demo task, run the whole stack on held-out human mot
 	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
 
 test: $(READY) ## every test but those in containers; linting, types and imports are among them
-	@$(RUN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile -m "not containers"
+	@$(RUN)/python -m pytest -n auto --maxprocesses 4 -m "not containers"
 
 lint: $(READY) ## put the code in the house's format and name what is left to mend
 	@$(RUN)/ruff format .

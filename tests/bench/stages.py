@@ -23,10 +23,9 @@ from hmcs.bus.messages import Belief, Envelope, Evidence, Motion, Step
 from hmcs.bus.wire import decode, encode
 from hmcs.fixtures.controller import Controller, Safeguards
 from hmcs.motion.demonstrations import read_csv
-from hmcs.motion.steps import Step as MotionStep
 from hmcs.recognition.layered import TaskRecognizer, bank_of
 from hmcs.recognition.model_file import load_model
-from hmcs.translation import sample_of
+from hmcs.translation import sample_of, step_of
 from hmcs_fixture_controller.translation import command_of, state_of
 from hmcs_input_device.playback import Passes, Playback
 from hmcs_task_hmm.gathering import Gathering
@@ -79,7 +78,7 @@ def classifier(to: int, path: Path) -> None:
     with connect(to) as following, accept(server) as before:
         for frame in frames(before):
             _, step = decode(frame.payload, Step)
-            evidence = bank.step(MotionStep(**dict(step)))
+            evidence = bank.step(step_of(step))
             message = Evidence(
                 model_hash=model.hash,
                 clock="clock",

@@ -53,7 +53,7 @@ BEHIND_S = 0.08
 """The hand follows its handle so much later."""
 RECOGNIZED = 0.95
 DEMONSTRATIONS = 3
-TRAINED_S = 40.0
+TRAINED_S = 120.0
 
 
 class Scripted:

@@ -24,12 +24,12 @@ TASK = "lines-through-obstacles"
 
 
 def written(recording: Path) -> list[tuple[float, float, str]]:
-    """What the file beside a recording says; nothing where there is none."""
+    """What the file beside a recording says beside its remarks; nothing where there is none."""
     beside = labels_beside(recording)
     if not beside.exists():
         return []
     with beside.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     return [(float(row["begin_s"]), float(row["end_s"]), row["state"]) for row in rows]
 
 

@@ -27,7 +27,7 @@ COARSE = 0.5
 """Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
 hardware."""
 PICTURES = Path(__file__).parents[2] / "out" / "browser"
-PAGE_S = 20.0
+PAGE_S = 60.0
 """A page without graphics hardware takes its time to be there."""
 START_S = 60.0
 """A browser beside them leaves services that come up little of the machine."""
@@ -37,13 +37,13 @@ GRIP_M = 0.13
 UP = np.array([0.0, 0.0, 1.0])
 LEFT = np.array([0.0, 1.0, 0.0])
 
-SLOW = ("--rate-hz", 5, "--lease-s", 1.0)
+SLOW = ("--rate-hz", 5, "--lease-s", 2.0)
 """A page without graphics hardware draws few frames a second, and answers as seldom."""
 
 _FIELD_OF_VIEW = np.radians(75.0)
 _CAMERA_FROM_START_M = (0.6, -0.8, 0.5)
 _GRAB_S = 2.0
-_DRAG_S = 30.0
+_DRAG_S = 60.0
 _LOOK_S = 0.05
 
 

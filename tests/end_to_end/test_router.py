@@ -10,7 +10,7 @@ import pytest
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from support.hand import Scene
-from support.stack import log_events
+from support.stack import DEADLINE_S, PATIENT_ROBOT, log_events
 
 RATE_HZ = 50.0
 
@@ -25,7 +25,7 @@ def test_everything_goes_on_when_the_router_comes_back(
         stack.start("gesteme_classifier", "b", "--model", model_file),
         stack.start("task_hmm", "t", "--model", model_file, "--deadline-ms", 250),
         stack.start("fixture_controller", "f", "--models", f'["{model_file}"]'),
-        stack.start("robot", "r"),
+        stack.start("robot", "r", *PATIENT_ROBOT),
     ]
     stack.until_ready(*services)
     pids = [service.pid for service in services]
@@ -34,15 +34,15 @@ def test_everything_goes_on_when_the_router_comes_back(
     stack.until(lambda: watcher.belief_of(50) and watcher.robot and watcher.fixture)
 
     stack.router.send(how)
-    stack.router.wait(5.0)
+    stack.router.wait(DEADLINE_S)
     stack.until(lambda: not scene.bus.connected)
     stack.elapse(0.5)
     outage_from = watcher.beliefs[-1].body.step
     seen = len(watcher.robot), len(watcher.fixture)
     stack.start_router()
-    stack.until(lambda: watcher.beliefs[-1].body.step > outage_from, within_s=5.0)
+    stack.until(lambda: watcher.beliefs[-1].body.step > outage_from)
     stack.until(lambda: len(watcher.robot) > seen[0] and len(watcher.fixture) > seen[1])
-    stack.until(lambda: watcher.belief_of(399), within_s=20.0)
+    stack.until(lambda: watcher.belief_of(399))
     stack.until_ready(*services)
 
     assert [service.pid for service in services] == pids

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hmcs.motion.steps import Step
 from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
+from hmcs.translation import step_of
 from support.hand import Watcher
 from support.stack import PATIENT_ROBOT, Stack
 
@@ -43,7 +43,7 @@ def perform(stack: Stack, performance_file: Path) -> Perform:
                 *PATIENT,
             ),
             *(stack.start("gesteme_classifier", c, *model) for model in models for c in "ab"),
-            *(stack.start("task_hmm", "t", *model, "--deadline-ms", 80) for model in models),
+            *(stack.start("task_hmm", "t", *model, "--deadline-ms", 250) for model in models),
         )
         stack.bring_up(
             "input_device",
@@ -89,7 +89,7 @@ def test_without_recognition_the_robot_goes_exactly_where_the_hand_goes(perform:
 
 
 def test_with_recognition_it_is_guided_along_the_way_of_the_hand(
-    perform: Perform, model_file: Path, model: Model, steps: list[Step]
+    perform: Perform, model_file: Path, model: Model
 ) -> None:
     watcher = perform(model_file)
     hand, tool = ways(watcher)
@@ -102,13 +102,14 @@ def test_with_recognition_it_is_guided_along_the_way_of_the_hand(
 
     beliefs = [r.body for r in watcher.beliefs]
     recognizer = LayeredRecognizer(model)
-    expected = [recognizer.step(step).belief.states for step in steps[: len(beliefs)]]
+    made = [step_of(received.body) for received in watcher.steps[: len(beliefs)]]
+    expected = [recognizer.step(step).belief.states for step in made]
     assert [belief.step for belief in beliefs] == list(range(len(beliefs)))
     agree = [
         belief.likely_state == model.state_names[int(states.argmax())]
         for belief, states in zip(beliefs, expected, strict=True)
     ]
-    # The device samples the demonstration anew at its own rate: its steps are not quite these.
+    # On a busy machine a belief may have to do without the evidence of a gesteme.
     assert np.mean(agree) > 0.95
 
 
@@ -128,7 +129,7 @@ def test_a_simulated_operator_closes_the_loop_through_the_bus(
     if guided:
         recognizers = (
             stack.start("gesteme_classifier", "a", "--model", model_file),
-            stack.start("task_hmm", "t", "--model", model_file, "--deadline-ms", 80),
+            stack.start("task_hmm", "t", "--model", model_file, "--deadline-ms", 250),
         )
     models = json.dumps([str(model_file)] if guided else [])
     stack.until_ready(

@@ -114,6 +114,7 @@ class Watcher:
         self.commands: list[Received[Command]] = []
         self.robot: list[Received[RobotState]] = []
         self.motions: list[Received[Motion]] = []
+        self.steps: list[Received[Step]] = []
         bus.subscribe(Belief, keys.belief(), self.beliefs.append)
         if evidence:
             bus.subscribe(Evidence, keys.evidence("*"), self.evidence.append)
@@ -121,6 +122,7 @@ class Watcher:
         bus.subscribe(Command, keys.command, self.commands.append)
         bus.subscribe(RobotState, keys.robot_state, self.robot.append)
         bus.subscribe(Motion, keys.motion, self.motions.append)
+        bus.subscribe(Step, keys.step, self.steps.append)
 
     def belief_of(self, step: int) -> Received[Belief] | None:
         """Return the first belief after a step."""
