@@ -22,8 +22,8 @@ setup: $(READY) ## make .venv from the lock file
 demo: $(READY) ## teach the demo task, run the whole stack on held-out human motion, write a report
 	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
 
-test: $(READY) ## every test but those in containers; linting, types and imports are among them
-	@$(RUN)/python -m pytest -n auto --maxprocesses 4 -m "not containers"
+test: $(READY) ## every test but those in a browser or in containers; linting, types and imports are among them
+	@$(RUN)/python -m pytest -n auto --maxprocesses 4 -m "not containers and not browser"
 
 lint: $(READY) ## put the code in the house's format and name what is left to mend
 	@$(RUN)/ruff format .

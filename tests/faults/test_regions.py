@@ -42,7 +42,7 @@ def test_a_second_robot_in_the_cell_is_refused_and_its_pose_opens_no_region(tmp_
             assert refused
             first = [r for r in descent.watcher.robot if r.envelope.source.instance == "robot"]
             assert min(map(descent.distance_m, first)) > -INSIDE_M
-            stack.until(lambda: stack.health(second).detail == "standing: no_command")
+            stack.until(lambda: stack.health(second).detail == "standing: not_paired")
             assert json.dumps(stack.health(descent.fixture).healthy) == "true"
         finally:
             descent.close()

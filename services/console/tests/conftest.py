@@ -26,7 +26,7 @@ from hmcs_console.settings import ConsoleSettings
 from support.doors import Behind, Door
 from support.made_up import line_model
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 LOG = logging.getLogger("test")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -121,9 +122,14 @@ def test_so_many_processes_are_known_and_no_more(make_cell: MakeCell) -> None:
 
 def test_so_many_recognizers_are_heard_and_no_more(make_cell: MakeCell) -> None:
     cell = make_cell()
-    for number in range(3 * MOST_RECOGNIZERS):
-        put(cell, cell.bus.keys.belief(f"made-up-{number}", "x"), belief())
-    cell.until(lambda: cell.bus.counters.refused["belief"] == 2 * MOST_RECOGNIZERS, "refusals")
+    numbers = count()
+
+    def refused() -> bool:
+        # One after another: of many at once a busy machine may lose some.
+        put(cell, cell.bus.keys.belief(f"made-up-{next(numbers)}", "x"), belief())
+        return cell.bus.counters.refused["belief"] >= 2 * MOST_RECOGNIZERS
+
+    cell.until(refused, "refusals")
     assert len(cell.service._seen.picture(0.0, "", None).recognizers) == MOST_RECOGNIZERS
 
 

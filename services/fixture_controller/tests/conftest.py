@@ -33,7 +33,7 @@ from hmcs_fixture_controller.service import FixtureController
 from hmcs_fixture_controller.settings import FixtureControllerSettings
 from support.made_up import line_model
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 PERIOD_S = 0.01
 LOG = logging.getLogger("test")
 

@@ -21,7 +21,7 @@ from hmcs.motion.demonstrations import Demonstration, write_csv
 from hmcs_input_device.service import InputDevice
 from hmcs_input_device.settings import InputDeviceSettings
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 LOG = logging.getLogger("test")
 
 

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 import pybullet
 
+from hmcs.fixtures.closest import cross
 from hmcs.motion import quaternions
 from hmcs_robot.driver import Array, JointLimits, Pose
 from hmcs_robot.robots import RobotModel
@@ -102,18 +103,23 @@ class Arm:
         return self._jacobian(self._tool_link, self._tool_from_mass, joint_positions)
 
     def separation_per_joint(
-        self, link: int, point: Array, normal: Array, joint_positions: Array
+        self, link: int, points: Array, normals: Array, joint_positions: Array
     ) -> Array:
-        """Return how `point` of `link`, m, base frame, moves along `normal`, m/rad, shape (n,)."""
+        """Return how points of `link`, m, base frame, move along `normals`, m/rad.
+
+        One point and normal have shape (3,), the answer (n,); k of them (k, 3), the answer (k, n).
+        """
         if link == BASE_LINK:
-            return np.zeros(len(self.joints))
+            return np.zeros((*points.shape[:-1], len(self.joints)))
         state = pybullet.getLinkState(
             self.body, link, computeForwardKinematics=True, physicsClientId=self._client
         )
         mass = Pose(np.array(state[0]), np.array(state[1]))
-        from_mass = _matrix(mass).T @ (point - mass.position)
-        speed: Array = normal @ self._jacobian(link, from_mass, joint_positions)[:3]
-        return speed
+        jacobian = self._jacobian(link, np.zeros(3), joint_positions)
+        # n·(v + ω × r) = n·v + (r × n)·ω, r from the mass to the point.
+        turning = cross(points - mass.position, normals)
+        speeds: Array = normals @ jacobian[:3] + turning @ jacobian[3:]
+        return speeds
 
     def _jacobian(self, link: int, from_mass: Array, joint_positions: Array) -> Array:
         """Return the Jacobian of a point given in the frame of the link's mass."""

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet
 
+from hmcs.fixtures.mesh_files import read_mesh
 from hmcs.motion import quaternions
 from hmcs.task import ForbiddenRegion, Obstacle
+from hmcs_robot.covering import CoveringBox, covering
 
 _FAR_M = 10.0
 """Half the size of the box that stands for all behind a plane."""
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
+_BOXES_OF_A_BODY = 16
+"""PyBullet takes no more shapes for one body."""
+_MOST_BOXES = 8 * _BOXES_OF_A_BODY
+"""To cover a mesh: their distances to an arm take half a millisecond, not more than a control cycle
+has."""
 
 
 def add_obstacle(obstacle: Obstacle, client: int) -> int:
@@ -43,8 +52,46 @@ def add_obstacle(obstacle: Obstacle, client: int) -> int:
     return body
 
 
-def add_region(region: ForbiddenRegion, client: int) -> int:
-    """Add a forbidden region that distances are measured to and nothing collides with."""
+def add_region(region: ForbiddenRegion, client: int) -> tuple[int, ...]:
+    """Add a forbidden region that distances are measured to and nothing collides with.
+
+    A mesh is added as boxes that cover its surface; returns the bodies. Raises MeshError for a mesh
+    file that cannot be read.
+    """
+    if region.shape == "mesh":
+        boxes = covering(_corners(region), _MOST_BOXES)
+        return tuple(
+            _added(_boxes_shape(boxes[begin : begin + _BOXES_OF_A_BODY], client), client)
+            for begin in range(0, len(boxes), _BOXES_OF_A_BODY)
+        )
+    return (_add_solid(region, client),)
+
+
+def links_touching(arm: int, mesh: ForbiddenRegion, within_m: float, client: int) -> frozenset[int]:
+    """Return the links that are so near to a mesh, asked triangle by triangle, which is slow."""
+    shape: int = pybullet.createCollisionShape(
+        pybullet.GEOM_MESH,
+        fileName=str(mesh.file),
+        meshScale=[mesh.scale or 1.0] * 3,
+        flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        physicsClientId=client,
+    )
+    body = _added(shape, client, mesh.position_m, mesh.orientation_xyzw)
+    points = pybullet.getClosestPoints(arm, body, within_m, physicsClientId=client)
+    pybullet.removeBody(body, physicsClientId=client)
+    return frozenset(point[3] for point in points)
+
+
+def _corners(region: ForbiddenRegion) -> np.ndarray:
+    """Return the triangles of a region that is a mesh, m, base frame, shape (T, 3, 3)."""
+    vertices, triangles = read_mesh(Path(str(region.file)))
+    rotation = quaternions.rotation_matrix(region.orientation_xyzw)
+    placed = (region.scale or 1.0) * vertices @ rotation.T + np.array(region.position_m)
+    corners: np.ndarray = placed[triangles]
+    return corners
+
+
+def _add_solid(region: ForbiddenRegion, client: int) -> int:
     position, turn = np.array(region.position_m), np.array(region.orientation_xyzw)
     shape: dict[str, Any]
     if region.shape == "plane":
@@ -62,23 +109,30 @@ def add_region(region: ForbiddenRegion, client: int) -> int:
         }  # fmt: skip
         position = position + axis / 2
         turn = _turn_to(axis / length_m) if length_m > 0 else turn
-    elif region.shape == "sphere":
-        shape = {"shapeType": pybullet.GEOM_SPHERE, "radius": region.radius_m}
     else:
-        shape = {
-            "shapeType": pybullet.GEOM_MESH,
-            "fileName": str(region.file),
-            "meshScale": [region.scale or 1.0] * 3,
-            "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        }
-    body: int = pybullet.createMultiBody(
-        0,
-        pybullet.createCollisionShape(**shape, physicsClientId=client),
-        -1,
-        position.tolist(),
-        turn.tolist(),
+        shape = {"shapeType": pybullet.GEOM_SPHERE, "radius": region.radius_m}
+    made: int = pybullet.createCollisionShape(**shape, physicsClientId=client)
+    return _added(made, client, position.tolist(), turn.tolist())
+
+
+def _boxes_shape(boxes: Sequence[CoveringBox], client: int) -> int:
+    made: int = pybullet.createCollisionShapeArray(
+        shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
+        halfExtents=[box.halves.tolist() for box in boxes],
+        collisionFramePositions=[box.center.tolist() for box in boxes],
+        collisionFrameOrientations=[quaternions.from_matrix(box.axes).tolist() for box in boxes],
         physicsClientId=client,
     )
+    return made
+
+
+def _added(
+    shape: int,
+    client: int,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+) -> int:
+    body: int = pybullet.createMultiBody(0, shape, -1, position, turn, physicsClientId=client)
     pybullet.setCollisionFilterGroupMask(body, -1, 0, 0, physicsClientId=client)
     return body
 

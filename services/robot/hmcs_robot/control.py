@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.closest import cross
 from hmcs.fixtures.regions import NOTHING, Candidates
 from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Array, Pose
@@ -216,16 +217,13 @@ class _Inverse:
         ∂Jᵢ/∂qⱼ is ωⱼ × (vᵢ, ωᵢ) for a joint j before i, and (ωᵢ × vⱼ, 0) for one after it.
         """
         linear, angular = self._jacobian[:3].T, self._jacobian[3:].T
-        along, turning = self._into[:3], self._into[3:]
-        growth = np.zeros(len(linear))
-        for i, share in enumerate(self._joints):
-            before, after = slice(0, i + 1), slice(i + 1, None)
-            growth[before] += share * (
-                np.cross(angular[before], linear[i]) @ along
-                + np.cross(angular[before], angular[i]) @ turning
-            )
-            growth[after] += share * (np.cross(angular[i], linear[after]) @ along)
-        return growth
+        # (ω × v)·u = ω·(v × u), so that what is summed over i is crossed once.
+        linear_across = cross(linear, self._into[:3])
+        across = linear_across + cross(angular, self._into[3:])
+        shares = self._joints[:, None]
+        behind = np.cumsum((shares * across)[::-1], axis=0)[::-1]
+        ahead = np.cumsum(shares * angular, axis=0) - shares * angular
+        return np.asarray(np.vecdot(angular, behind) + np.vecdot(linear_across, ahead))
 
     def velocities(self, twist: Array) -> Array:
         """Return the joint velocities (n,) for `twist`."""

@@ -51,14 +51,14 @@ class Touch(NamedTuple):
 
 
 class LinkNear(NamedTuple):
-    """A place where a link of the arm is near a forbidden region."""
+    """Where a link of the arm is near a forbidden region, k places."""
 
     name: str
     """Of the region."""
-    distance_m: float
-    """Negative where the link is inside."""
+    distances_m: Array
+    """Negative where the link is inside, shape (k,)."""
     separation_per_joint: Array
-    """As in `Touch`."""
+    """As in `Touch`, shape (k, n)."""
 
 
 class ArmState(NamedTuple):

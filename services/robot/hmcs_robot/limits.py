@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.closest import cross
 from hmcs.fixtures.keep_out import KeepOut
 from hmcs.fixtures.regions import NOTHING, Candidates
 from hmcs_robot.driver import ArmState, Array, JointLimits
@@ -138,7 +139,7 @@ def bounds_of(arm: ArmState, limits: Limits, planes: Candidates = NOTHING) -> Bo
     to_wall = _room(arm.tool.position, limits, 0.0)
     linear, angular = arm.jacobian[:3], arm.jacobian[3:]
     # A corner at a lever r from the tool moves at v + ω × r, so that n·(ω × r) = (r × n)·ω.
-    toward_planes = -(planes.normals @ linear + np.cross(planes.levers, planes.normals) @ angular)
+    toward_planes = -(planes.normals @ linear + cross(planes.levers, planes.normals) @ angular)
     parts = [
         (each, limits.braking_per_s * np.maximum(to_end[: len(at)], 0.0), None),
         (-each, limits.braking_per_s * np.maximum(to_end[len(at) :], 0.0), None),
@@ -149,9 +150,8 @@ def bounds_of(arm: ArmState, limits: Limits, planes: Candidates = NOTHING) -> Bo
         (toward_planes, limits.braking_per_s * np.maximum(planes.distances, 0.0), "region"),
         *(
             (
-                -near.separation_per_joint[None],
-                limits.braking_per_s
-                * np.maximum(np.array([near.distance_m - limits.link_margin_m]), 0.0),
+                -near.separation_per_joint,
+                limits.braking_per_s * np.maximum(near.distances_m - limits.link_margin_m, 0.0),
                 "region",
             )
             for near in arm.links_near

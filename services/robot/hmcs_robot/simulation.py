@@ -11,7 +11,7 @@ import pybullet
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm
-from hmcs_robot.bodies import add_obstacle, add_region
+from hmcs_robot.bodies import add_obstacle, add_region, links_touching
 from hmcs_robot.driver import ArmState, Array, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
 from hmcs_robot.looks import Looks, looks_of
@@ -45,6 +45,19 @@ class Scene(NamedTuple):
     obstacles: tuple[Obstacle, ...]
     forbidden: tuple[ForbiddenRegion, ...] = ()
     """Regions that the links are kept out of; they are no bodies to collide with."""
+
+
+class _LinkPoints(NamedTuple):
+    """Points of a link that are closest to parts of a region, k of them."""
+
+    link: int
+    region: str
+    distances_m: Array
+    """Shape (k,)."""
+    on_arm: Array
+    """m, base frame, shape (k, 3)."""
+    normals: Array
+    """Away from the region, shape (k, 3)."""
 
 
 class Simulation:
@@ -82,7 +95,7 @@ class Simulation:
             add_obstacle(obstacle, self._client): obstacle.name for obstacle in scene.obstacles
         }
         self._regions = {
-            add_region(region, self._client): region.name for region in scene.forbidden
+            region.name: add_region(region, self._client) for region in scene.forbidden
         }
         self.arm.place(self.home)
         for joint in self.arm.other_joints:
@@ -95,10 +108,8 @@ class Simulation:
                 physicsClientId=self._client,
             )
         # A base that stands behind the plane of a table is there to stay.
-        self._within = {
-            (link, body) for link, body, distance, *_ in self._link_points() if distance < _WITHIN_M
-        }
-        within = {(self.arm.link_name(link), self._regions[b]) for link, b in self._within}
+        self._within, self._granted_m = self._already_within(scene.forbidden)
+        within = {(self.arm.link_name(link), name) for link, name in self._within}
         self.links_within = tuple(f"{link} in {name}" for link, name in sorted(within))
         touched = self.read().contacts
         if ITSELF in touched:
@@ -178,22 +189,58 @@ class Simulation:
     def _links_near(self, positions: Array) -> tuple[LinkNear, ...]:
         return tuple(
             LinkNear(
-                self._regions[body],
-                distance,
-                self.arm.separation_per_joint(link, on_arm, normal, positions),
+                near.region,
+                near.distances_m + self._granted_m.get((near.link, near.region), 0.0),
+                self.arm.separation_per_joint(near.link, near.on_arm, near.normals, positions),
             )
-            for link, body, distance, on_arm, normal in self._link_points()
-            if (link, body) not in self._within
+            for near in self._link_points()
+            if (near.link, near.region) not in self._within
         )
 
-    def _link_points(self) -> Iterator[tuple[int, int, float, Array, Array]]:
-        """Yield link, region, distance, m, the point on the link and the normal, (3,) each."""
-        for body in self._regions:
-            for point in pybullet.getClosestPoints(
-                self.arm.body, body, _LINKS_WITHIN_M, physicsClientId=self._client
-            ):
-                if point[3] in self.arm.moving_links:
-                    yield point[3], body, point[8], np.array(point[5]), np.array(point[7])
+    def _already_within(
+        self, regions: tuple[ForbiddenRegion, ...]
+    ) -> tuple[set[tuple[int, str]], dict[tuple[int, str], float]]:
+        """Return which links reach into which regions, and how deep into the cover of which meshes.
+
+        A link that reaches into boxes that cover a mesh, and not into the mesh, is granted to stay
+        as deep in them, m.
+        """
+        touched = {
+            region.name: links_touching(self.arm.body, region, _WITHIN_M, self._client)
+            for region in regions
+            if region.shape == "mesh"
+        }
+        within: set[tuple[int, str]] = set()
+        granted_m: dict[tuple[int, str], float] = {}
+        for near in self._link_points():
+            least_m = float(near.distances_m.min())
+            if least_m >= _WITHIN_M:
+                continue
+            if near.link in touched.get(near.region, {near.link}):
+                within.add((near.link, near.region))
+            else:
+                granted_m[near.link, near.region] = _WITHIN_M - least_m
+        return within, granted_m
+
+    def _link_points(self) -> Iterator[_LinkPoints]:
+        """Yield where links are near regions: each link and region once."""
+        for region, bodies in self._regions.items():
+            points = [
+                point
+                for body in bodies
+                for point in pybullet.getClosestPoints(
+                    self.arm.body, body, _LINKS_WITHIN_M, physicsClientId=self._client
+                )
+            ]
+            for link in sorted({point[3] for point in points} & self.arm.moving_links):
+                own = [point for point in points if point[3] == link]
+                yield _LinkPoints(
+                    link,
+                    region,
+                    np.array([point[8] for point in own]),
+                    np.array([point[5] for point in own]),
+                    np.array([point[7] for point in own]),
+                )
 
     def _meeting_links(self, positions: Array) -> Iterator[Touch]:
         for one, other in self.arm.apart:

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.control import Following, Standing, Tuning, follow
@@ -161,20 +163,32 @@ AROUND_THE_ELBOW = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("shape", AROUND_THE_ELBOW)
+def ball_of_triangles(folder: Path, center: list[float], radius_m: float, finer: int) -> Any:
+    """Return a mesh; it has 20 * 4**finer triangles."""
+    file = folder / "ball.stl"
+    trimesh.creation.icosphere(subdivisions=finer, radius=radius_m).export(file)
+    return region(shape="mesh", position_m=center, file=str(file))
+
+
+@pytest.mark.parametrize("shape", [*AROUND_THE_ELBOW, "mesh"])
 def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
-    starts: dict[str, Pose], period_s: float, shape: str
+    starts: dict[str, Pose], period_s: float, shape: str, tmp_path: Path
 ) -> None:
     start = starts["puma560"]
-    scene = Scene("puma560", start, (), (region(**AROUND_THE_ELBOW[shape]),))
-    simulation = Simulation(scene, period_s)
+    sphere = AROUND_THE_ELBOW["sphere"]
+    around = (
+        ball_of_triangles(tmp_path, sphere["position_m"], sphere["radius_m"], 4)
+        if shape == "mesh"
+        else region(**AROUND_THE_ELBOW[shape])
+    )
+    simulation = Simulation(Scene("puma560", start, (), (around,)), period_s)
     limits = Limits(simulation.limits, 0.25, 0.5, start.position - 2, start.position + 2)
     carried: Following | Standing = Standing()
     nearest = []
     try:
         for cycle in range(1200):
             arm = simulation.read()
-            nearest.append(min((near.distance_m for near in arm.links_near), default=np.inf))
+            nearest.append(min((near.distances_m.min() for near in arm.links_near), default=np.inf))
             # Round about, so that every link comes near.
             angle = cycle / 200
             twist = np.array([0.2 * np.cos(angle), 0.25, 0.2 * np.sin(angle), 0, 0, 0])
@@ -187,6 +201,45 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
     assert min(nearest) > -1e-4
 
 
+def test_however_fine_a_mesh_is_few_of_its_places_are_told_and_none_is_farther_than_the_mesh(
+    starts: dict[str, Pose], period_s: float, tmp_path: Path
+) -> None:
+    center, radius_m = [0.35, 0.3, 0.75], 0.25
+    found = {}
+    for finer in (2, 6):
+        mesh = ball_of_triangles(tmp_path, center, radius_m, finer)
+        sphere = region(shape="sphere", position_m=center, radius_m=radius_m)
+        told = []
+        for around in (mesh, sphere):
+            simulation = Simulation(Scene("puma560", starts["puma560"], (), (around,)), period_s)
+            told.append(simulation.read().links_near)
+            simulation.close()
+        near, exactly = told
+        assert len(near) >= len(exactly) > 0
+        found[finer] = sum(len(each.distances_m) for each in near)
+        least_m = min(float(each.distances_m.min()) for each in near)
+        exact_m = min(float(each.distances_m.min()) for each in exactly)
+        # Boxes stick out of a ball by less than this; flat triangles lie in it by as little.
+        assert exact_m - 0.012 < least_m < exact_m + 0.006
+    assert found[6] < 1000
+
+
+def test_a_link_in_the_boxes_about_a_mesh_and_not_in_it_is_kept_where_it_is(
+    starts: dict[str, Pose], period_s: float, tmp_path: Path
+) -> None:
+    start = starts["puma560"]
+    # A shell about the whole arm: boxes that cover a coarse one reach far into it.
+    file = tmp_path / "shell.stl"
+    trimesh.creation.icosphere(subdivisions=1, radius=2.0).export(file)
+    shell = region(shape="mesh", position_m=[0.0, 0.0, 0.0], file=str(file))
+    simulation = Simulation(Scene("puma560", start, (), (shell,)), period_s)
+    try:
+        assert simulation.links_within == ()
+        assert all((near.distances_m > 0).all() for near in simulation.read().links_near)
+    finally:
+        simulation.close()
+
+
 def test_a_link_in_a_forbidden_region_at_the_start_stays_there_and_the_others_are_kept_out(
     starts: dict[str, Pose], period_s: float
 ) -> None:
@@ -197,6 +250,6 @@ def test_a_link_in_a_forbidden_region_at_the_start_stays_there_and_the_others_ar
         assert all(text.endswith(" in region") for text in simulation.links_within)
         near = simulation.read().links_near
         assert near
-        assert all(each.distance_m > 0 for each in near)
+        assert all((each.distances_m > 0).all() for each in near)
     finally:
         simulation.close()

@@ -87,6 +87,21 @@ def turned(orientation: FloatArray, angular_velocity: FloatArray, duration_s: fl
     return np.asarray(result / np.linalg.norm(result))
 
 
+def from_matrix(rotation: FloatArray) -> FloatArray:
+    """Return the quaternion of a rotation matrix, (3, 3), w not negative (Bar-Itzhack 2000)."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    symmetric = np.array(
+        [
+            [xx - yy - zz, yx + xy, zx + xz, zy - yz],
+            [yx + xy, yy - xx - zz, zy + yz, xz - zx],
+            [zx + xz, zy + yz, zz - xx - yy, yx - xy],
+            [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+        ]
+    )
+    found: FloatArray = np.linalg.eigh(symmetric)[1][:, -1]
+    return -found if found[3] < 0 else found
+
+
 def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
     """Return the rotation of a unit quaternion x y z w as a matrix, shape (3, 3).
 

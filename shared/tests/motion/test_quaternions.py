@@ -36,3 +36,11 @@ def test_between_keeps_its_digits_at_tiny_angles() -> None:
         way = np.array([size, -2 * size, size])
         found = quaternions.between(start, quaternions.turned(start, way, 1.0))
         assert np.abs(found - way).max() < 1e-15
+
+
+@given(vectors)
+def test_a_matrix_gives_back_its_quaternion(vector: np.ndarray) -> None:
+    found = quaternions.from_matrix(Rotation.from_rotvec(vector).as_matrix())
+    expected = Rotation.from_rotvec(vector).as_quat(canonical=False)
+    assert found[3] >= 0.0
+    assert min(np.abs(found - expected).max(), np.abs(found + expected).max()) < 1e-9
