@@ -16,7 +16,7 @@ pytestmark = pytest.mark.browser
 OpenViewer = Callable[..., Viewer]
 
 LIFTED_M = 0.10
-MOVING_M_S, STANDING_M_S = 0.05, 0.002
+MOVING_M_S, STANDING_M_S = 0.02, 0.002
 STANDS_WITHIN_S = 0.250
 DOWN_M, UP_M = 0.15, 0.32
 """From down there up there the hand is on its way for longer than it takes to close a page."""

@@ -23,7 +23,7 @@ from support.stack import Stack
 TASK = "human-shapes"
 SIZE = (800, 600)
 """The panel stands on the right of it and leaves the middle free."""
-COARSE = 0.5
+COARSE = 0.25
 """Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
 hardware."""
 PICTURES = Path(__file__).parents[2] / "out" / "browser"

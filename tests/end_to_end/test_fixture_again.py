@@ -1,7 +1,7 @@
 """What the fixture would have done with the model it had is what it did.
 
 Not to the last bit: the recorder hears samples, beliefs and the robot at moments of its own, so
-that a belief may come a tick earlier or later than it came to the fixture controller. Filters
+that a belief may come some ticks earlier or later than it came to the fixture controller. Filters
 against tremor mind how far apart samples came, which is why velocities are not compared here.
 """
 
@@ -21,8 +21,8 @@ from support.stack import PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """Two shapes and a switch between them."""
-ALIKE = 0.98
-TICKS = 2
+ALIKE = 0.95
+TICKS = 5
 """So much later or earlier than the recorder heard of it may the fixture controller have heard of
 something: then k, on its way up or down, is what it was at a neighboring tick."""
 PATIENT = ("--input-stale-after-ms", 500, "--command-valid-for-ms", 500)
@@ -64,7 +64,10 @@ def test_with_the_same_model_the_fixture_would_have_done_what_it_did(
     content = read(file)
     replay = replayed(content, kept_model(content))
     fixture = guided(content, replay)
-    assert compared(replay).same_bits == len(replay.beliefs) > 60
+    beliefs = compared(replay)
+    assert beliefs.same_bits == beliefs.compared > 60
+    # The recording may end between the last step and the belief after it.
+    assert len(replay.beliefs) - beliefs.compared <= 1
     assert fixture.notes == ()
     figures = fixtures_compared(fixture)
     assert figures.compared > 0.7 * figures.ticks > 600
