@@ -23,7 +23,7 @@ demo: $(READY) ## teach the demo task, run the whole stack on held-out human mot
 	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
 
 test: $(READY) ## every test but those in a browser or in containers; linting, types and imports are among them
-	@$(RUN)/python -m pytest -n auto --maxprocesses 4 -m "not containers and not browser"
+	@$(RUN)/python -m pytest -n auto --maxprocesses 5 -m "not containers and not browser"
 
 lint: $(READY) ## put the code in the house's format and name what is left to mend
 	@$(RUN)/ruff format .
@@ -46,7 +46,7 @@ test-browser: $(READY) ## drive the operator's page in a chromium, with playwrig
 
 pictures: $(READY) ## take the pictures of the page that stand in docs/ anew, in a chromium
 	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
-	@$(RUN)/python -m pytest -q -m browser tests/browser/test_pictures.py
+	@PICTURES_COARSE=1 $(RUN)/python -m pytest -q -m browser tests/browser/test_pictures.py
 	@cp out/browser/page.png out/browser/page-plots.png out/browser/page-teach.png \
 	  out/browser/page-recordings.png docs/
 

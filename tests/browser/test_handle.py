@@ -16,7 +16,7 @@ pytestmark = pytest.mark.browser
 OpenViewer = Callable[..., Viewer]
 
 LIFTED_M = 0.10
-MOVING_M_S, STANDING_M_S = 0.02, 0.002
+MOVING_M_S, STANDING_M_S = 0.05, 0.002
 STANDS_WITHIN_S = 0.250
 DOWN_M, UP_M = 0.15, 0.32
 """From down there up there the hand is on its way for longer than it takes to close a page."""
@@ -80,7 +80,8 @@ def test_a_page_closed_in_mid_motion_lets_the_robot_stand_in_time(
     began = heard.tool.copy()
     foot = viewer.drag(lambda: heard.held and began[2] - heard.tool[2] > DOWN_M / 2, -DOWN_M, 4)
     viewer.lift_to(foot, UP_M)
-    operated.stack.until(lambda: heard.speed > MOVING_M_S)
+    # It may still be on its way down, which is the shorter one.
+    operated.stack.until(lambda: heard.robot[-1][1].tool_twist[2] > MOVING_M_S)
     asked_ns = time.monotonic_ns()
     viewer.page.close()
     closed_ns = time.monotonic_ns()
@@ -124,16 +125,17 @@ def test_stop_on_a_page_stops_a_robot_that_another_device_drives(
     )
     stack.until(lambda: heard.speed > MOVING_M_S)
     viewer.press("Stop")
-    stack.until(lambda: heard.robot[-1][1].stop == "asked")
+    stack.until(lambda: any(told.stop == "asked" for _, told in heard.robot))
     until_stands(following)
     viewer.until(lambda: viewer.sees("stands until the operator lets go and takes hold again"))
+    # Who plays a recording has let go, and does not take hold again by itself.
+    stack.until(lambda: not held[-1])
     stood, count = heard.tool.copy(), len(held)
     stack.elapse(1.0)
-    # The device goes on as if nothing had been.
     assert len(held) > count + 20
-    assert all(held[count:])
+    assert not any(held[count:])
     assert np.linalg.norm(heard.tool - stood) < 1e-3
-    assert heard.robot[-1][1].stop == "asked"
+    assert heard.robot[-1][1].stop != "none"
 
 
 def test_a_handle_kept_to_a_plane_moves_the_tool_within_it_only(

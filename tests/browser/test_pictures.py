@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +30,8 @@ OpenViewer = Callable[..., Viewer]
 SIZE = (1100, 640)
 SHAPES = ("GShape", "NShape", "PShape", "JShape", "Snake")
 LEAST_COLORS = 1000
+COARSE = float(os.environ.get("PICTURES_COARSE", "0.5"))
+"""Pictures for the documents have every pixel, which takes minutes without graphics hardware."""
 
 
 def test_a_page_that_looks_at_a_stack_at_work_can_be_pictured(
@@ -52,7 +55,7 @@ def test_a_page_that_looks_at_a_stack_at_work_can_be_pictured(
         ),
         console=("--models", f'["{model}"]'),
     )
-    viewer = open_viewer(cell, size=SIZE, coarse=1.0)
+    viewer = open_viewer(cell, size=SIZE, coarse=COARSE)
     warning = viewer.page.locator(".mantine-Notification-root")
     # On a page without graphics hardware it may be on its way for longer than a click waits.
     warning.get_by_role("button").dispatch_event("click")
