@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from hmcs_robot.covering import CoveringBox, covering
 _FAR_M = 10.0
 """Half the size of the box that stands for all behind a plane."""
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
+_TRIANGLES_AT_ONCE = 20_000
+"""PyBullet takes no more than 131 072 corners for one shape."""
 _BOXES_OF_A_BODY = 16
 """PyBullet takes no more shapes for one body."""
 _MOST_BOXES = 8 * _BOXES_OF_A_BODY
@@ -67,19 +69,32 @@ def add_region(region: ForbiddenRegion, client: int) -> tuple[int, ...]:
     return (_add_solid(region, client),)
 
 
-def links_touching(arm: int, mesh: ForbiddenRegion, within_m: float, client: int) -> frozenset[int]:
-    """Return the links that are so near to a mesh, asked triangle by triangle, which is slow."""
-    shape: int = pybullet.createCollisionShape(
-        pybullet.GEOM_MESH,
-        fileName=str(mesh.file),
-        meshScale=[mesh.scale or 1.0] * 3,
-        flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        physicsClientId=client,
-    )
-    body = _added(shape, client, mesh.position_m, mesh.orientation_xyzw)
-    points = pybullet.getClosestPoints(arm, body, within_m, physicsClientId=client)
-    pybullet.removeBody(body, physicsClientId=client)
-    return frozenset(point[3] for point in points)
+def links_touching(
+    arm: int, links: Collection[int], mesh: ForbiddenRegion, within_m: float, client: int
+) -> frozenset[int]:
+    """Return which of an arm's links are so near to a mesh, asked triangle by triangle."""
+    corners = _corners(mesh)
+    lowest, highest = corners.min(axis=1), corners.max(axis=1)
+    touching = set()
+    for link in links:
+        lower, upper = np.array(pybullet.getAABB(arm, link, physicsClientId=client))
+        near = (lowest <= upper + within_m) & (highest >= lower - within_m)
+        around = corners[near.all(axis=1)]
+        for begin in range(0, len(around), _TRIANGLES_AT_ONCE):
+            # Triangles instead of the file: of STL files PyBullet reads binary ones only.
+            some = around[begin : begin + _TRIANGLES_AT_ONCE]
+            shape: int = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH,
+                vertices=some.reshape(-1, 3).tolist(),
+                indices=list(range(3 * len(some))),
+                flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+                physicsClientId=client,
+            )
+            body = _added(shape, client)
+            if pybullet.getClosestPoints(arm, body, within_m, link, physicsClientId=client):
+                touching.add(link)
+            pybullet.removeBody(body, physicsClientId=client)
+    return frozenset(touching)
 
 
 def _corners(region: ForbiddenRegion) -> np.ndarray:

@@ -205,21 +205,18 @@ class Simulation:
         A link that reaches into boxes that cover a mesh, and not into the mesh, is granted to stay
         as deep in them, m.
         """
-        touched = {
-            region.name: links_touching(self.arm.body, region, _WITHIN_M, self._client)
-            for region in regions
-            if region.shape == "mesh"
+        deep_m = {
+            (near.link, near.region): float(near.distances_m.min())
+            for near in self._link_points()
+            if float(near.distances_m.min()) < _WITHIN_M
         }
-        within: set[tuple[int, str]] = set()
-        granted_m: dict[tuple[int, str], float] = {}
-        for near in self._link_points():
-            least_m = float(near.distances_m.min())
-            if least_m >= _WITHIN_M:
-                continue
-            if near.link in touched.get(near.region, {near.link}):
-                within.add((near.link, near.region))
-            else:
-                granted_m[near.link, near.region] = _WITHIN_M - least_m
+        within = set(deep_m)
+        for mesh in (region for region in regions if region.shape == "mesh"):
+            links = {link for link, name in deep_m if name == mesh.name}
+            if links:
+                touching = links_touching(self.arm.body, links, mesh, _WITHIN_M, self._client)
+                within -= {(link, mesh.name) for link in links - touching}
+        granted_m = {key: _WITHIN_M - deep_m[key] for key in deep_m.keys() - within}
         return within, granted_m
 
     def _link_points(self) -> Iterator[_LinkPoints]:

@@ -240,6 +240,20 @@ def test_a_link_in_the_boxes_about_a_mesh_and_not_in_it_is_kept_where_it_is(
         simulation.close()
 
 
+@pytest.mark.parametrize("written", ["stl", "stl_ascii", "obj"])
+def test_a_mesh_is_taken_from_every_kind_of_file(
+    starts: dict[str, Pose], period_s: float, tmp_path: Path, written: str
+) -> None:
+    file = tmp_path / f"ball.{written[:3]}"
+    trimesh.creation.icosphere(subdivisions=3, radius=0.05).export(file, file_type=written)
+    ball = region(shape="mesh", position_m=[0.2, -0.2, 0.9], file=str(file))
+    simulation = Simulation(Scene("puma560", starts["puma560"], (), (ball,)), period_s)
+    try:
+        assert simulation.links_within == ("upper_arm in region",)
+    finally:
+        simulation.close()
+
+
 def test_a_link_in_a_forbidden_region_at_the_start_stays_there_and_the_others_are_kept_out(
     starts: dict[str, Pose], period_s: float
 ) -> None:
