@@ -1,8 +1,9 @@
-"""For every test: a machine that is busy with something else makes no example too slow."""
+"""For every test: a busy machine makes no example too slow, and whole stacks go before the rest."""
 
 from __future__ import annotations
 
 import os
+from functools import cache
 from typing import Any
 
 import pytest
@@ -12,7 +13,10 @@ from xdist.scheduler import LoadFileScheduling
 settings.register_profile("any-machine", deadline=None)
 settings.load_profile("any-machine")
 
-OF_WHOLE_STACKS = tuple(f"tests/{kind}/" for kind in ("end_to_end", "faults", "fuzz", "hosts"))
+OF_WHOLE_STACKS = tuple(
+    f"tests/{kind}/" for kind in ("bench", "end_to_end", "faults", "fuzz", "hosts")
+)
+YIELDING_NICENESS = 10
 
 
 class OneStackAtATime(LoadFileScheduling):
@@ -22,6 +26,18 @@ class OneStackAtATime(LoadFileScheduling):
         if nodeid.startswith(OF_WHOLE_STACKS):
             return "whole stacks"
         return super()._split_scope(nodeid)
+
+
+@cache
+def yield_to_whole_stacks() -> None:
+    """Let the processes of a whole stack go before this one."""
+    os.nice(YIELDING_NICENESS)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Run a test that needs no whole stack behind those that do, where they run side by side."""
+    if hasattr(item.config, "workerinput") and not item.nodeid.startswith(OF_WHOLE_STACKS):
+        yield_to_whole_stacks()
 
 
 @pytest.hookimpl(optionalhook=True)

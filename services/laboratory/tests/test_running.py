@@ -25,12 +25,12 @@ def without_times(result: StudyResult) -> list[dict[str, object]]:
 
 def test_rows_are_the_same_for_one_worker_two_workers_and_a_cluster():
     distributed = pytest.importorskip("distributed")
-    alone = without_times(tiny("noise", seed=7, workers=1))
-    assert without_times(tiny("noise", seed=7, workers=2)) == alone
+    alone = without_times(tiny("restart", seed=7, workers=1))
+    assert without_times(tiny("restart", seed=7, workers=2)) == alone
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
-        on_cluster = tiny("noise", seed=7, cluster=cluster.scheduler_address)
+        on_cluster = tiny("restart", seed=7, cluster=cluster.scheduler_address)
     assert without_times(on_cluster) == alone
 
 
