@@ -81,11 +81,11 @@ def test_a_second_fixture_controller_moves_nothing_until_the_first_is_gone(
     assert "second_writer" not in {r.body.stop for r in watcher.robot}
     assert stack.health(robot).healthy
 
-    before = len(watcher.robot)
     first.send(signal.SIGKILL)
     stack.until(lambda: watcher.robot[-1].body.stop != "none")
-    stack.until(lambda: len(watcher.robot) > before + 120)
+    stopped = len(watcher.robot)
+    stack.until(lambda: len(watcher.robot) > stopped + 200)
     # The second one's commands count now, but it has not been re-engaged since.
-    after = [r.body for r in watcher.robot[before:]]
-    stood = [state.stop for state in after].index(after[-1].stop)
-    assert not any(np.any(state.reference_twist) for state in after[stood:])
+    standing = [r.body for r in watcher.robot[stopped + 100 :]]
+    assert not any(state.stop == "none" for state in standing)
+    assert not any(np.any(state.reference_twist) for state in standing)
