@@ -7,11 +7,14 @@ import re
 import shutil
 import stat
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from browser.viewing import TASK, Cell, Viewer
+from hmcs.task import load_task
 from support.stack import PATIENT_ROBOT, Stack
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -43,6 +46,7 @@ FOLLOWING = (
     ),
 )
 OPERATED = (*FOLLOWING, ("input_device", "--source", "page", "--task", TASK))
+SLOWLY_M_S = 0.1
 
 OpenViewer = Callable[..., Viewer]
 
@@ -90,6 +94,20 @@ def following(browser: Any, stack: Stack) -> Cell:
     """A robot that follows whatever device there will be."""
     del browser  # Without one no process needs to be started.
     cell = Cell(stack, *FOLLOWING)
+    stack.until(lambda: cell.heard.robot)
+    return cell
+
+
+@pytest.fixture
+def operated_slowly(browser: Any, stack: Stack, tmp_path: Path) -> Cell:
+    """A robot that follows the handle of the page, and is long on its way."""
+    del browser  # Without one no process needs to be started.
+    task = load_task(TASK).model_dump(mode="json", exclude_none=True)
+    task["robot"]["speed_limit_m_s"] = SLOWLY_M_S
+    file = tmp_path / "slow.yaml"
+    file.write_text(yaml.safe_dump(task), encoding="utf-8")
+    robot = ("robot", "--task", file, *PATIENT_ROBOT)
+    cell = Cell(stack, robot, *OPERATED[1:])
     stack.until(lambda: cell.heard.robot)
     return cell
 

@@ -74,18 +74,18 @@ def test_a_second_page_cannot_operate_while_the_first_holds_the_handle(
 
 
 def test_a_page_closed_in_mid_motion_lets_the_robot_stand_in_time(
-    operated: Cell, open_viewer: OpenViewer, record_property: Record
+    operated_slowly: Cell, open_viewer: OpenViewer, record_property: Record
 ) -> None:
-    viewer, heard = open_viewer(operated), operated.heard
+    viewer, heard = open_viewer(operated_slowly), operated_slowly.heard
     began = heard.tool.copy()
     foot = viewer.drag(lambda: heard.held and began[2] - heard.tool[2] > DOWN_M / 2, -DOWN_M, 4)
     viewer.lift_to(foot, UP_M)
     # It may still be on its way down, which is the shorter one.
-    operated.stack.until(lambda: heard.robot[-1][1].tool_twist[2] > MOVING_M_S)
+    operated_slowly.stack.until(lambda: heard.robot[-1][1].tool_twist[2] > MOVING_M_S)
     asked_ns = time.monotonic_ns()
     viewer.page.close()
     closed_ns = time.monotonic_ns()
-    operated.stack.until(lambda: heard.robot[-1][0] > closed_ns + 1e9)
+    operated_slowly.stack.until(lambda: heard.robot[-1][0] > closed_ns + 1e9)
     released_ns = next(at for at, told in heard.handles if at > asked_ns and not told.dead_man)
     before = [told for at, told in heard.robot if at < released_ns][-1]
     moving_ns = [at for at, told in heard.robot if speed_of(told) >= STANDING_M_S][-1]

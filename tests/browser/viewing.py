@@ -42,8 +42,8 @@ SLOW = ("--rate-hz", 5, "--lease-s", 2.0)
 
 _FIELD_OF_VIEW = np.radians(75.0)
 _CAMERA_FROM_START_M = (0.6, -0.8, 0.5)
-_GRAB_S = 2.0
-_DRAG_S = 60.0
+_GRAB_S = 4.0
+_DRAG_S = 150.0
 _LOOK_S = 0.05
 
 
@@ -231,7 +231,7 @@ class Viewer:
 
     def grab(self, along: NDArray[np.float64] = UP) -> NDArray[np.float64]:
         """Take hold of the handle, with another try where it is not drawn yet; return its foot."""
-        heard, deadline_s = self.cell.heard, time.monotonic() + PAGE_S
+        heard, deadline_s = self.cell.heard, time.monotonic() + _DRAG_S
         while True:
             foot = self.reach_for_handle(along)
             until_s = time.monotonic() + _GRAB_S

@@ -165,7 +165,7 @@ def test_a_step_without_evidence_is_believed_after_the_deadline_and_names_what_w
 ) -> None:
     flags = ("--model", model_file, "--gestemes", '["GShape", "Snake"]')
     scene.stack.bring_up("gesteme_classifier", "a", *flags)
-    scene.stack.bring_up("task_hmm", "t", "--model", model_file)
+    scene.stack.bring_up("task_hmm", "t", "--model", model_file, *PATIENT)
     scene.play(steps[:30], RATE_HZ)
     for received in scene.watcher.beliefs:
         assert received.body.missing_gestemes == ("NShape", "PShape", "JShape")

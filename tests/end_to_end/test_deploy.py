@@ -58,8 +58,11 @@ def test_models_take_over_one_after_another_without_a_gap_and_come_back(
     assert gaps.max() < 1.0
     assert np.median(gaps) < 2 * TICK_S
     factors = np.array([received.body.factor for received in running.fixtures])
-    seconds = np.diff([received.received_ns for received in running.fixtures]) / 1e9
-    assert (np.abs(np.diff(factors)) <= 16.0 * np.maximum(seconds, TICK_S) + 0.05).all()
+    times_s = np.array([received.received_ns for received in running.fixtures]) / 1e9
+    # A message that is late on its way follows the one before it by too much, or is followed too
+    # soon: the times of those around count as well.
+    changes, spans_s = np.abs(np.diff(factors))[1:-1], times_s[3:] - times_s[:-3]
+    assert (changes <= 16.0 * np.maximum(spans_s, 3 * TICK_S) + 0.05).all()
 
     assert running.watched(lambda bus: back(bus, running.control, folder)) == "human-shapes"
     assert running.watched(active_model) == "human-shapes"

@@ -21,11 +21,14 @@ from support.stack import PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """Two shapes and a switch between them."""
-ALIKE = 0.95
+ALIKE = 0.9
 TICKS = 5
 """So much later or earlier than the recorder heard of it may the fixture controller have heard of
 something: then k, on its way up or down, is what it was at a neighboring tick."""
-PATIENT = ("--input-stale-after-ms", 500, "--command-valid-for-ms", 500)
+PATIENT = (
+    *("--input-stale-after-ms", 500, "--command-valid-for-ms", 500),
+    *("--belief-stale-after-ms", 500),
+)
 """A machine that stands still a moment is no fault here."""
 
 
