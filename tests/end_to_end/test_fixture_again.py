@@ -17,7 +17,7 @@ from hmcs.recordings.guiding import Guided, guided
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import kept_model, replayed
 from support.hand import PERIOD_S, Watcher
-from support.stack import PATIENT_ROBOT, Stack
+from support.stack import PATIENT_FIXTURE, PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """Two shapes and a switch between them."""
@@ -25,11 +25,6 @@ ALIKE = 0.9
 TICKS = 5
 """So much later or earlier than the recorder heard of it may the fixture controller have heard of
 something: then k, on its way up or down, is what it was at a neighboring tick."""
-PATIENT = (
-    *("--input-stale-after-ms", 500, "--command-valid-for-ms", 500),
-    *("--belief-stale-after-ms", 500),
-)
-"""A machine that stands still a moment is no fault here."""
 
 
 def alike_within_ticks(fixture: Guided) -> float:
@@ -49,7 +44,7 @@ def test_with_the_same_model_the_fixture_would_have_done_what_it_did(
     models = ("--models", json.dumps([str(model_file)]))
     stack.until_ready(
         stack.start("robot", "r", *PATIENT_ROBOT),
-        stack.start("fixture_controller", "f", *models, *PATIENT),
+        stack.start("fixture_controller", "f", *models, *PATIENT_FIXTURE),
         stack.start("recognizer", "r", "--model", model_file),
     )
     folder = tmp_path / "recordings"

@@ -14,16 +14,10 @@ from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
 from hmcs.translation import step_of
 from support.hand import Watcher
-from support.stack import PATIENT_ROBOT, Stack
+from support.stack import PATIENT_FIXTURE, PATIENT_ROBOT, Stack
 
 SPAN_S = 10.0
 """How much of the performance is watched: two shapes and a switch between them."""
-
-PATIENT = (
-    *("--input-stale-after-ms", 500, "--command-valid-for-ms", 500),
-    *("--belief-stale-after-ms", 500),
-)
-"""The way is looked at here, not the stops: a machine that stands still a moment is no fault."""
 
 Perform = Callable[..., Watcher]
 
@@ -43,7 +37,7 @@ def perform(stack: Stack, performance_file: Path) -> Perform:
                 "fixture_controller",
                 "f",
                 *("--models", json.dumps([str(f) for f in model_files])),
-                *PATIENT,
+                *PATIENT_FIXTURE,
             ),
             *(stack.start("gesteme_classifier", c, *model) for model in models for c in "ab"),
             *(stack.start("task_hmm", "t", *model, "--deadline-ms", 250) for model in models),
@@ -138,7 +132,7 @@ def test_a_simulated_operator_closes_the_loop_through_the_bus(
     models = json.dumps([str(model_file)] if guided else [])
     stack.until_ready(
         stack.start("robot", "r", *PATIENT_ROBOT),
-        stack.start("fixture_controller", "f", "--models", models, *PATIENT),
+        stack.start("fixture_controller", "f", "--models", models, *PATIENT_FIXTURE),
         *recognizers,
     )
     stack.bring_up(

@@ -27,6 +27,11 @@ DEADLINE_S = 60.0
 """What has not come about after so long never will."""
 PATIENT_ROBOT = ("--hang-s", 0.5, "--command-valid-for-ms", 500, "--late-tick-s", 0.5)
 """Of a robot whose way is looked at, not its stops: a machine that stands still is no fault."""
+PATIENT_FIXTURE = (
+    *("--input-stale-after-ms", 500, "--command-valid-for-ms", 500),
+    *("--belief-stale-after-ms", 500),
+)
+"""The same of a fixture controller."""
 _LOOK_S = 0.003
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from hmcs.fixtures.mesh_files import read_mesh
+from hmcs.fixtures.mesh_files import read_placed_mesh
 from hmcs.motion import quaternions
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.covering import CoveringBox, covering
@@ -99,10 +99,11 @@ def links_touching(
 
 def _corners(region: ForbiddenRegion) -> np.ndarray:
     """Return the triangles of a region that is a mesh, m, base frame, shape (T, 3, 3)."""
-    vertices, triangles = read_mesh(Path(str(region.file)))
     rotation = quaternions.rotation_matrix(region.orientation_xyzw)
-    placed = (region.scale or 1.0) * vertices @ rotation.T + np.array(region.position_m)
-    corners: np.ndarray = placed[triangles]
+    vertices, triangles = read_placed_mesh(
+        Path(str(region.file)), region.scale or 1.0, rotation, np.array(region.position_m)
+    )
+    corners: np.ndarray = vertices[triangles]
     return corners
 
 

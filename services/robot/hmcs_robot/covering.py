@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.fixtures.clusters import principal_boxes
+from hmcs.fixtures.surfaces import area_vectors
 from hmcs_robot.driver import Array
 
 LEAST_HALF_M = 1e-4
@@ -34,13 +36,9 @@ class CoveringBox(NamedTuple):
     @classmethod
     def about(cls, corners: Array) -> CoveringBox:
         """Return the box about triangles, m, shape (T, 3, 3)."""
-        points = corners.reshape(-1, 3)
-        middle = points.mean(axis=0)
-        axes = np.linalg.eigh((points - middle).T @ (points - middle))[1]
+        (center,), (axes,), (halves,) = principal_boxes(corners.reshape(1, -1, 3))
         axes[:, 0] *= np.sign(np.linalg.det(axes))
-        local = (points - middle) @ axes
-        lower, upper = local.min(axis=0), local.max(axis=0)
-        return cls(middle + axes @ (0.5 * (lower + upper)), axes, 0.5 * (upper - lower))
+        return cls(center, axes, halves)
 
 
 def covering(corners: Array, most: int) -> tuple[CoveringBox, ...]:
@@ -52,8 +50,7 @@ def covering(corners: Array, most: int) -> tuple[CoveringBox, ...]:
 
     def entry(some: Array) -> tuple[float, int, Array, CoveringBox]:
         box = CoveringBox.about(some)
-        across = np.cross(some[:, 1] - some[:, 0], some[:, 2] - some[:, 0])
-        filled_m3 = _GROWN_M * float(np.linalg.norm(across, axis=1).sum())
+        filled_m3 = _GROWN_M * float(np.linalg.norm(area_vectors(some), axis=1).sum())
         empty_m3 = 8.0 * float(np.prod(box.halves + _GROWN_M)) - filled_m3
         return -empty_m3 if len(some) > 1 else 0.0, next(numbers), some, box
 
