@@ -96,7 +96,9 @@ class SpreadCell:
         """Look until a condition is true; return what it gave."""
         deadline_s = time.monotonic() + within_s
         while not (value := condition()):
-            assert time.monotonic() < deadline_s, f"did not come about within {within_s:g} s"
+            assert time.monotonic() < deadline_s, (
+                f"did not come about within {within_s:g} s; {self.last_seen()}"
+            )
             self.look()
         return value
 
@@ -132,9 +134,26 @@ class SpreadCell:
         stood_ns = self.states[begin].received_ns
         return any(m.received_ns > stood_ns and not m.body.dead_man for m in self.motions)
 
-    def moves(self) -> bool:
-        """Whether the robot moves now."""
-        return bool(self.states) and _speed(self.states[-1]) > MOVING_M_S
+    def follows(self) -> bool:
+        """Whether the robot follows commands now, and they move it."""
+        if not self.fresh_states:
+            return False
+        last = self.states[-1]
+        return last.body.stop == "none" and _speed(last) > MOVING_M_S
+
+    def last_seen(self) -> str:
+        """Tell what robot and operator said last, and how long ago."""
+        told = [f"{len(self.fresh_states)} states, {len(self.beliefs)} beliefs"]
+        if self.states:
+            state, ago_s = self.states[-1].body, _ago_s(self.states[-1])
+            told.append(
+                f"robot {ago_s:.1f} s ago: stop {state.stop}, contacts {state.contacts}, "
+                f"at {state.tool_position}"
+            )
+        if self.motions:
+            motion, ago_s = self.motions[-1].body, _ago_s(self.motions[-1])
+            told.append(f"hand {ago_s:.1f} s ago: dead_man {motion.dead_man}")
+        return "; ".join(told)
 
     def believes(self) -> bool:
         """Whether beliefs reach the robot's host."""
@@ -153,7 +172,8 @@ class SpreadCell:
         if host == "robot":
             bus.subscribe(RobotState, bus.keys.robot_state, self.states.append)
             bus.subscribe(Belief, bus.keys.belief(), self.beliefs.append)
-        if host == "operator":
+        # What one observer misses while it is connected anew, the other may hear.
+        if host in ("operator", "robot"):
             bus.subscribe(Motion, bus.keys.motion, self.motions.append)
 
     def _start(self, host: str, service: str, *flags: object, instance: int = 1) -> None:
@@ -174,6 +194,10 @@ class SpreadCell:
             self._folder / f"{self._count}-{name}.log",
             stop_grace_s=10.0,
         )
+
+
+def _ago_s(received: Received[Any]) -> float:
+    return (time.monotonic_ns() - received.received_ns) * 1e-9
 
 
 def _speed(received: Received[RobotState]) -> float:

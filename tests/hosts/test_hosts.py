@@ -15,7 +15,8 @@ from hosts.network import WHY_NOT, Network, possible
 pytestmark = pytest.mark.skipif(not possible(), reason=WHY_NOT)
 
 STILL_FOR_S = 1.5
-"""So long after a link was cut nothing of what was under way before can be on its way."""
+"""So long after a link was cut nothing of what was under way before can be on its way, and whoever
+was at its ends has given it up."""
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +32,9 @@ def cell(
 
 
 def comes_back(cell: SpreadCell) -> None:
-    """Wait until the robot moves and is assisted by fresh beliefs."""
+    """Wait until the robot follows the operator and is assisted by fresh beliefs."""
     cell.forget()
-    cell.until(lambda: cell.moves() and cell.believes())
+    cell.until(lambda: cell.follows() and cell.believes())
     # Never motion out of a stop without a re-engage: the operator was seen to let go.
     assert cell.released_since_it_stood()
 
@@ -55,6 +56,7 @@ def test_a_link_that_is_cut_is_gone_round_and_taken_again(
     comes_back(cell)
     cell.network.cut(one, other)
     try:
+        cell.look_for(STILL_FOR_S)
         comes_back(cell)
     finally:
         cell.network.heal(one, other)

@@ -35,6 +35,8 @@ from hmcs_robot.service import Robot
 from hmcs_robot.settings import RobotSettings
 
 DEADLINE_S = 60.0
+VALID_FOR_S = 1.0
+"""So long a busy machine may keep a command; it is the longest there is."""
 TASK = """
 format: hmcs-task/1
 name: push
@@ -67,7 +69,7 @@ class Cell:
             # Patient, so that a busy machine is not taken for a hang or a late command.
             hang_s=hang_s,
             late_tick_s=5.0,
-            command_valid_for_ms=500,
+            command_valid_for_ms=VALID_FOR_S * 1000,
             realtime_priority=0,
         )
         self.robot = Robot(settings, self.bus, logging.getLogger("robot"))
@@ -91,7 +93,7 @@ class Cell:
     def say(self, engaged: bool, y_m_s: float = 0.0, writer: str = "fixture") -> None:
         twist = np.array([0.0, y_m_s, 0, 0, 0, 0])
         self.writer(writer).put(
-            Command(twist=twist, valid_for_ns=500_000_000, engaged=engaged),
+            Command(twist=twist, valid_for_ns=round(VALID_FOR_S * 1e9), engaged=engaged),
             Origin(boot="hand", seq=7, captured_ns=1),
         )
 
@@ -113,6 +115,16 @@ class Cell:
     def engage(self, y_m_s: float = 0.0, writer: str = "fixture") -> None:
         self.until(lambda s: s.stop == "disengaged", lambda: self.say(False, writer=writer))
         self.until(lambda s: s.stop == "none", lambda: self.say(True, y_m_s, writer))
+
+    def drive(self, y_m_s: float, true: Callable[[RobotState], bool]) -> RobotState:
+        """Command a velocity until a state is as wished, and return it; engage where need be."""
+
+        def command() -> None:
+            late = bool(self.said) and self.said[-1].stop == "stale_command"
+            self.say(not late, y_m_s)
+
+        self.engage(y_m_s)
+        return self.until(true, command)
 
     def _hear(self, received: Received[RobotState]) -> None:
         self.said.append(received.body)
@@ -155,8 +167,7 @@ def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cel
     assert begun.nearest_obstacle == "wall"
     assert begun.joint_names[0] == "waist"
     assert len(begun.joint_names) == len(begun.joint_positions) == 6
-    cell.engage(-0.1)
-    cell.until(lambda s: s.tool_position[1] < -0.03, lambda: cell.say(True, -0.1))
+    cell.drive(-0.1, lambda s: s.stop == "none" and s.tool_position[1] < -0.03)
     moving = cell.said[-1]
     assert moving.tool_twist[:3] == pytest.approx([0, -0.1, 0], abs=0.005)
     assert moving.reference_twist == pytest.approx([0, -0.1, 0, 0, 0, 0], abs=1e-6)
@@ -205,13 +216,11 @@ def test_it_stops_when_asked_and_follows_again_after_a_new_engage(cell: Cell) ->
 
 
 def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:
-    cell.engage(0.2)
-    hit = cell.until(lambda s: s.stop == "collision", lambda: cell.say(True, 0.2))
+    hit = cell.drive(0.2, lambda s: s.stop == "collision")
     assert hit.contacts == ("wall",)
     cell.until(lambda s: np.abs(s.joint_velocities).max() < 1e-3, lambda: cell.say(True, 0.2))
     assert cell.said[-1].stop == "collision"
-    cell.engage(-0.1)
-    away = cell.until(lambda s: s.tool_position[1] < 0.0, lambda: cell.say(True, -0.1))
+    away = cell.drive(-0.1, lambda s: s.tool_position[1] < 0.0)
     assert away.contacts == ()
 
 
