@@ -46,7 +46,8 @@ def test_the_page_shows_a_scene_and_asks_nobody_but_its_console(
 
 
 def test_the_plots_go_on_while_beliefs_arrive(watched: Cell, open_viewer: OpenViewer) -> None:
-    viewer = open_viewer(watched)
+    # Drawn coarsely a curve is thinner than a pixel, and has another color.
+    viewer = open_viewer(watched, coarse=1.0)
     viewer.open_tab("Plots")
     plot = viewer.page.locator(".uplot").first
     viewer.until(plot.is_visible)

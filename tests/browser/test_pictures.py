@@ -22,7 +22,7 @@ from hmcs.task import load_task
 from hmcs_trainer.performance import perform
 from hmcs_trainer.training import train
 from support.recordings import Maker, hand_of
-from support.stack import Stack
+from support.stack import PATIENT_FIXTURE, PATIENT_ROBOT, Stack
 
 pytestmark = pytest.mark.browser
 OpenViewer = Callable[..., Viewer]
@@ -30,7 +30,9 @@ OpenViewer = Callable[..., Viewer]
 SIZE = (1100, 640)
 SHAPES = ("GShape", "NShape", "PShape", "JShape", "Snake")
 LEAST_COLORS = 1000
-COARSE = float(os.environ.get("PICTURES_COARSE", "0.5"))
+UNHURRIED_ROBOT = ("--physics-rate-hz", 120, "--state-rate-hz", 30)
+"""A browser that draws without graphics hardware needs most of the machine."""
+COARSE = float(os.environ.get("PICTURES_COARSE", "0.25"))
 """Pictures for the documents have every pixel, which takes minutes without graphics hardware."""
 
 
@@ -44,14 +46,14 @@ def test_a_page_that_looks_at_a_stack_at_work_can_be_pictured(
     takes = label_a_take(tmp_path / "takes")
     cell = Cell(
         stack,
-        ("robot", "--task", TASK),
+        ("robot", "--task", TASK, *PATIENT_ROBOT, *UNHURRIED_ROBOT),
         ("recognizer", "--model", model),
-        ("fixture_controller", "--models", f'["{model}"]'),
+        ("fixture_controller", "--models", f'["{model}"]', *PATIENT_FIXTURE),
         ("recorder", "--folder", takes, "--no-autostart", "--free-mb", 0),
         (
             "input_device",
             *("--source", "recorded", "--demonstration", performance),
-            *("--task", TASK, "--repeat", 0, "--re-engage"),
+            *("--task", TASK, "--rate-hz", 30, "--repeat", 0, "--re-engage"),
         ),
         console=("--models", f'["{model}"]'),
     )

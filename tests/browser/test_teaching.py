@@ -70,9 +70,11 @@ class Scripted:
         corners = CORNERS_M * rng.uniform(0.95, 1.05) + np.array([0.6, 0.1, 0.4])
         sides_m = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         ends_s = np.cumsum(sides_m) / SPEED_M_S
+        self._tell(corners[0], held=False)
+        # Taken hold of in the same moment it would not be seen to have been let go.
+        self._cell.stack.elapse(PRESSED_S)
         first, begins, turns = len(self.steps), [], [0.0, *ends_s[:-1] + BEHIND_S]
         began_s, pedal_until_s = time.monotonic(), 0.0
-        self._tell(corners[0], held=False)
         while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S:
             while len(begins) < len(STATES) and at_s >= turns[len(begins)]:
                 begins.append(self._next)

@@ -27,15 +27,17 @@ COARSE = 0.25
 """Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
 hardware."""
 FRUGAL = """(() => {
-  const drawnAtMs = 150;
+  const restMs = 150;
   let asked = new Map(), next = 1;
   window.requestAnimationFrame = what => { asked.set(next, what); return next++; };
   window.cancelAnimationFrame = which => { asked.delete(which); };
-  setInterval(() => {
-    const due = asked;
+  const draw = () => {
+    const began = performance.now(), due = asked;
     asked = new Map();
-    for (const what of due.values()) what(performance.now());
-  }, drawnAtMs);
+    for (const what of due.values()) what(began);
+    setTimeout(draw, Math.max(restMs, 2 * (performance.now() - began)));
+  };
+  setTimeout(draw, restMs);
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, how) {
     const smooth = kind.startsWith("webgl") ? { antialias: false } : {};
