@@ -98,8 +98,9 @@ class Network:
         old = host.addresses[other]
         new = ".".join([*old.split(".")[:3], str(int(old.rsplit(".", 1)[1]) + 100)])
         device = self._device(name, other)
-        _run("ip", "-n", host.namespace, "address", "add", f"{new}/24", "dev", device)
+        # The first address of a network may take the others of it along when it goes.
         _run("ip", "-n", host.namespace, "address", "delete", f"{old}/24", "dev", device)
+        _run("ip", "-n", host.namespace, "address", "add", f"{new}/24", "dev", device)
         host.addresses[other] = new
 
     def _add_host(self, number: int, name: str) -> None:

@@ -42,7 +42,7 @@ def test_another_seed_gives_other_rows():
 
 def test_progress_counts_every_trial():
     done: list[int] = []
-    tiny("gesteme-count", workers=1, progress=done.append)
+    tiny("restart", workers=1, progress=done.append)
     assert done == [1, 2, 3]
 
 

@@ -17,8 +17,13 @@ _SAY_AFTER_S = 0.5
 _SAY_EVERY_S = 3.0
 _LOOK_EVERY_S = 0.05
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.25
+_ATTEMPT_S = OPENING_MS / 1000 + 1.0
+"""After so long another attempt is made beside one that has not ended. Where packets are lost
+without a word, as those to a host that is coming up, the kernel asks for a connection ever more
+seldom, for two minutes."""
 _ENDING_S = 1.0
 """How long the interpreter may take to end; no attempt may end within that time."""
+_SILENT = "it does not answer"
 _ADVICE = "start one with `hmcs router`, or name another with --router or HMCS_ROUTER"
 
 
@@ -35,7 +40,8 @@ def connect(
 ) -> zenoh.Session:
     """Return a session with the router, once there is one; says every few seconds that it waits.
 
-    An attempt may take as long as a far router needs; stopping does not wait for it.
+    An attempt may take as long as a far router needs, and is given up for another where it takes
+    longer; stopping does not wait for it.
     Raises StoppedError once `stopping` is true, and BusUnavailableError after
     `settings.connect_timeout_s` where that is set.
     """
@@ -44,9 +50,11 @@ def connect(
     while True:
         attempt = _Attempt(settings)
         try:
-            while not attempt.ended(_LOOK_EVERY_S):
-                waiting.go_on("it does not answer")
-            return attempt.session()
+            while not attempt.ended(_LOOK_EVERY_S) and not attempt.is_overdue():
+                waiting.go_on(_SILENT)
+            if attempt.is_over:
+                return attempt.session()
+            reason = _SILENT
         except zenoh.ZError as error:
             reason = str(error).split(" at /")[0]
         finally:
@@ -110,6 +118,15 @@ class _Attempt:
         """Wait at most so long; return whether it has come to an end."""
         return self._ended.wait(timeout_s)
 
+    @property
+    def is_over(self) -> bool:
+        """Whether it has come to an end."""
+        return self._ended.is_set()
+
+    def is_overdue(self) -> bool:
+        """Whether it has not ended within the time that a far router needs."""
+        return not self.is_over and time.monotonic() - self._began_s > _ATTEMPT_S
+
     def session(self) -> zenoh.Session:
         """Return the session of an attempt that has ended, the caller's own from now on.
 
@@ -128,7 +145,7 @@ class _Attempt:
             session, self._session = self._session, None
         if session is not None:
             session.close()  # type: ignore[no-untyped-call]
-        if not self._ended.is_set():
+        if not self.is_over:
             atexit.register(self._end_before_exit)
 
     def _open(self) -> None:
@@ -147,5 +164,5 @@ class _Attempt:
     def _end_before_exit(self) -> None:
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         left_s = self._began_s + OPENING_MS / 1000 - time.monotonic()
-        if left_s < _ENDING_S:
+        if abs(left_s) < _ENDING_S:
             self._thread.join(max(0.0, left_s) + _ENDING_S)

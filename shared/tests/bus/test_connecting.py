@@ -139,6 +139,30 @@ def test_an_attempt_that_was_given_up_closes_the_session_it_opens(
     until(lambda: opened and opened[0].is_closed())
 
 
+def test_beside_an_attempt_that_does_not_end_another_one_is_made(
+    router, monkeypatch, until
+) -> None:
+    opened, go_on, calls = [], threading.Event(), []
+    zenoh_open = zenoh.open
+
+    def first_one_late(config: zenoh.Config) -> zenoh.Session:
+        calls.append(config)
+        if len(calls) > 1:
+            return zenoh_open(config)
+        go_on.wait()
+        opened.append(zenoh_open(config))
+        return opened[0]
+
+    monkeypatch.setattr(connecting.zenoh, "open", first_one_late)
+    monkeypatch.setattr(connecting, "_ATTEMPT_S", 0.2)
+    settings = BusSettings(router=router, connect_timeout_s=60)
+    with connect(settings, LOG, lambda: False) as session:
+        assert list(session.info.routers_zid())
+        go_on.set()
+        until(lambda: opened and opened[0].is_closed())
+        assert not session.is_closed()
+
+
 def test_an_interrupt_while_waiting_gives_the_attempt_up(router, monkeypatch, until) -> None:
     opened, go_on = [], threading.Event()
     zenoh_open = zenoh.open
