@@ -44,8 +44,8 @@ FRUGAL = """(() => {
     return context.call(this, kind, { ...how, ...smooth });
   };
 })()"""
-"""Without graphics hardware a scene drawn as often as it can be, with smooth edges, leaves little of
-the machine to the page itself and to the processes under test."""
+"""Without graphics hardware a scene that is drawn as often as it can be, with smooth edges, leaves
+little of the machine to the page itself and to the processes under test."""
 PICTURES = Path(__file__).parents[2] / "out" / "browser"
 PAGE_S = 60.0
 """A page without graphics hardware takes its time to be there."""
