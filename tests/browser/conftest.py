@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from browser.viewing import TASK, Cell, Viewer
+from browser.viewing import TASK, UNHURRIED, Cell, Viewer
 from hmcs.task import load_task
 from support.stack import PATIENT_ROBOT, Stack
 
@@ -39,7 +39,7 @@ PATIENT_MS = 400
 FOLLOWING = (
     # A browser without graphics hardware leaves them little of the machine; whether they stop in
     # time for one another is for other tests to show.
-    ("robot", "--task", TASK, *PATIENT_ROBOT),
+    ("robot", "--task", TASK, *PATIENT_ROBOT, *UNHURRIED),
     (
         "fixture_controller",
         *("--input-stale-after-ms", PATIENT_MS, "--command-valid-for-ms", PATIENT_MS),
@@ -106,7 +106,7 @@ def operated_slowly(browser: Any, stack: Stack, tmp_path: Path) -> Cell:
     task["robot"]["speed_limit_m_s"] = SLOWLY_M_S
     file = tmp_path / "slow.yaml"
     file.write_text(yaml.safe_dump(task), encoding="utf-8")
-    robot = ("robot", "--task", file, *PATIENT_ROBOT)
+    robot = ("robot", "--task", file, *PATIENT_ROBOT, *UNHURRIED)
     cell = Cell(stack, robot, *OPERATED[1:])
     stack.until(lambda: cell.heard.robot)
     return cell

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from browser.viewing import LEFT, TASK, UP, Cell, Viewer, speed_of
+from browser.viewing import DRAG_S, LEFT, TASK, UP, Cell, Viewer, speed_of
 from hmcs.bus.messages import Motion
 
 pytestmark = pytest.mark.browser
@@ -63,7 +63,7 @@ def test_a_second_page_cannot_operate_while_the_first_holds_the_handle(
         second.let_go()
         return second.sees("wait until that page lets go")
 
-    second.until(refused)
+    second.until(refused, DRAG_S)
     assert {handle.operator for _, handle in heard.handles} == {operator}
     assert heard.held
     assert np.linalg.norm(heard.tool - stood) < 1e-3

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from browser.viewing import TASK, Cell, Viewer
+from browser.viewing import TASK, UNHURRIED, Cell, Viewer
 from hmcs.recordings.labels import write_labels
 from hmcs.recordings.reading import read
 from hmcs.recordings.stretches import Stretch
@@ -30,8 +30,6 @@ OpenViewer = Callable[..., Viewer]
 SIZE = (1100, 640)
 SHAPES = ("GShape", "NShape", "PShape", "JShape", "Snake")
 LEAST_COLORS = 1000
-UNHURRIED_ROBOT = ("--physics-rate-hz", 120, "--state-rate-hz", 30)
-"""A browser that draws without graphics hardware needs most of the machine."""
 COARSE = float(os.environ.get("PICTURES_COARSE", "0.25"))
 """Pictures for the documents have every pixel, which takes minutes without graphics hardware."""
 
@@ -46,7 +44,7 @@ def test_a_page_that_looks_at_a_stack_at_work_can_be_pictured(
     takes = label_a_take(tmp_path / "takes")
     cell = Cell(
         stack,
-        ("robot", "--task", TASK, *PATIENT_ROBOT, *UNHURRIED_ROBOT),
+        ("robot", "--task", TASK, *PATIENT_ROBOT, *UNHURRIED),
         ("recognizer", "--model", model),
         ("fixture_controller", "--models", f'["{model}"]', *PATIENT_FIXTURE),
         ("recorder", "--folder", takes, "--no-autostart", "--free-mb", 0),

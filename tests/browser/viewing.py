@@ -27,17 +27,15 @@ COARSE = 0.25
 """Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
 hardware."""
 FRUGAL = """(() => {
-  const restMs = 150;
+  const drawnAtMs = 150;
   let asked = new Map(), next = 1;
   window.requestAnimationFrame = what => { asked.set(next, what); return next++; };
   window.cancelAnimationFrame = which => { asked.delete(which); };
-  const draw = () => {
-    const began = performance.now(), due = asked;
+  setInterval(() => {
+    const due = asked;
     asked = new Map();
-    for (const what of due.values()) what(began);
-    setTimeout(draw, Math.max(restMs, 2 * (performance.now() - began)));
-  };
-  setTimeout(draw, restMs);
+    for (const what of due.values()) what(performance.now());
+  }, drawnAtMs);
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, how) {
     const smooth = kind.startsWith("webgl") ? { antialias: false } : {};
@@ -63,8 +61,12 @@ SLOW = ("--rate-hz", 5, "--lease-s", 2.0)
 _FIELD_OF_VIEW = np.radians(75.0)
 _CAMERA_FROM_START_M = (0.6, -0.8, 0.5)
 _GRAB_S = 4.0
-_DRAG_S = 150.0
+DRAG_S = 150.0
+"""What takes several movements of the mouse."""
 _LOOK_S = 0.05
+
+UNHURRIED = ("--physics-rate-hz", 120, "--state-rate-hz", 60)
+"""Of a robot beside a browser that draws without graphics hardware, and needs most of the machine."""
 
 
 class Heard:
@@ -252,7 +254,7 @@ class Viewer:
 
     def grab(self, along: NDArray[np.float64] = UP) -> NDArray[np.float64]:
         """Take hold of the handle, with another try where it is not drawn yet; return its foot."""
-        heard, deadline_s = self.cell.heard, time.monotonic() + _DRAG_S
+        heard, deadline_s = self.cell.heard, time.monotonic() + DRAG_S
         while True:
             foot = self.reach_for_handle(along)
             until_s = time.monotonic() + _GRAB_S
@@ -281,7 +283,7 @@ class Viewer:
         On a machine that is busy a page may be silent for so long that it counts as having let go:
         then the handle is grabbed anew, as its operator would.
         """
-        stack, deadline_s = self.cell.stack, time.monotonic() + _DRAG_S
+        stack, deadline_s = self.cell.stack, time.monotonic() + DRAG_S
         while True:
             foot = self.grab(along)
             for share in np.linspace(0.0, 1.0, moves + 1)[1:]:
@@ -294,7 +296,7 @@ class Viewer:
                 stack.pump()
             assert time.monotonic() < deadline_s, "dragging the handle has not the effect"
             self.let_go()
-            stack.until(lambda: not self.cell.heard.held)
+            stack.until(lambda: not self.cell.heard.held, DRAG_S)
 
     def let_go(self) -> None:
         """Release the mouse."""
