@@ -26,24 +26,14 @@ SIZE = (800, 600)
 COARSE = 0.25
 """Pixels drawn for one of those: a fourth of them is drawn four times as fast without graphics
 hardware."""
-FRUGAL = """(() => {
-  const drawnAtMs = 150;
-  let asked = new Map(), next = 1;
-  window.requestAnimationFrame = what => { asked.set(next, what); return next++; };
-  window.cancelAnimationFrame = which => { asked.delete(which); };
-  setInterval(() => {
-    const due = asked;
-    asked = new Map();
-    for (const what of due.values()) what(performance.now());
-  }, drawnAtMs);
+JAGGED = """(() => {
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, how) {
-    const smooth = kind.startsWith("webgl") ? { antialias: false } : {};
-    return context.call(this, kind, { ...how, ...smooth });
+    const jagged = kind.startsWith("webgl") ? { antialias: false } : {};
+    return context.call(this, kind, { ...how, ...jagged });
   };
 })()"""
-"""Without graphics hardware a scene that is drawn as often as it can be, with smooth edges, leaves
-little of the machine to the page itself and to the processes under test."""
+"""Without graphics hardware smooth edges take what the page and the processes under test need."""
 PICTURES = Path(__file__).parents[2] / "out" / "browser"
 PAGE_S = 60.0
 """A page without graphics hardware takes its time to be there."""
@@ -66,7 +56,7 @@ DRAG_S = 150.0
 _LOOK_S = 0.05
 
 UNHURRIED = ("--physics-rate-hz", 120, "--state-rate-hz", 60)
-"""Of a robot beside a browser that draws without graphics hardware, and needs most of the machine."""
+"""Of a robot beside a browser that draws without graphics hardware."""
 
 
 class Heard:
@@ -159,7 +149,7 @@ class Viewer:
             device_scale_factor=coarse,
             **context,
         )
-        self._context.add_init_script(FRUGAL)
+        self._context.add_init_script(JAGGED)
         self.page = self._context.new_page()
         self.page.set_default_timeout(PAGE_S * 1e3)
         self._context.on("request", lambda request: self.requests.append(request.url))

@@ -13,7 +13,7 @@ from support.stack import Stack
 
 
 @pytest.mark.parametrize(
-    ("shape", "ways"), [("plane", WAYS[::2]), ("box", WAYS[1::2]), ("mesh", WAYS[:2])]
+    ("shape", "ways"), [("plane", WAYS[:2]), ("box", WAYS[2:3]), ("mesh", WAYS[3:])]
 )
 def test_beside_a_fixture_that_is_killed_hung_flooded_or_replaced_the_tool_stays_out(
     tmp_path: Path, shape: Shape, ways: tuple[How, ...]
