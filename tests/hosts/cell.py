@@ -55,7 +55,6 @@ class SpreadCell:
         self._start(
             "operator", "input_device", "--source", "recorded", "--demonstration", performance,
             "--rate-hz", 100, "--repeat", 0, "--re-engage",
-            "--wait-for", json.dumps(["robot", "fixture_controller"]),
         )  # fmt: skip
 
     def close(self) -> None:
