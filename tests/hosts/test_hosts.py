@@ -96,4 +96,5 @@ def test_a_host_that_moves_to_another_address_is_found_again(cell: SpreadCell) -
     comes_back(cell)
     for other in ("recognizers", "robot"):
         cell.network.move("operator", other)
-    comes_back(cell)
+        cell.look_for(STILL_FOR_S)
+        comes_back(cell)
