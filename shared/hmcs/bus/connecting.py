@@ -23,7 +23,6 @@ without a word, as those to a host that is coming up, the kernel asks for a conn
 seldom, for two minutes."""
 _ENDING_S = 1.0
 """How long the interpreter may take to end; no attempt may end within that time."""
-_SILENT = "it does not answer"
 _ADVICE = "start one with `hmcs router`, or name another with --router or HMCS_ROUTER"
 
 
@@ -48,13 +47,12 @@ def connect(
     waiting = _Waiting(settings, log, stopping)
     pause_s = _FIRST_PAUSE_S
     while True:
-        attempt = _Attempt(settings)
+        attempt, reason = _Attempt(settings), "it does not answer"
         try:
-            while not attempt.ended(_LOOK_EVERY_S) and not attempt.is_overdue():
-                waiting.go_on(_SILENT)
-            if attempt.is_over:
-                return attempt.session()
-            reason = _SILENT
+            while not attempt.overdue:
+                if attempt.ended(_LOOK_EVERY_S):
+                    return attempt.session()
+                waiting.go_on(reason)
         except zenoh.ZError as error:
             reason = str(error).split(" at /")[0]
         finally:
@@ -119,13 +117,9 @@ class _Attempt:
         return self._ended.wait(timeout_s)
 
     @property
-    def is_over(self) -> bool:
-        """Whether it has come to an end."""
-        return self._ended.is_set()
-
-    def is_overdue(self) -> bool:
-        """Whether it has not ended within the time that a far router needs."""
-        return not self.is_over and time.monotonic() - self._began_s > _ATTEMPT_S
+    def overdue(self) -> bool:
+        """Whether it was begun longer ago than a far router needs."""
+        return time.monotonic() - self._began_s > _ATTEMPT_S
 
     def session(self) -> zenoh.Session:
         """Return the session of an attempt that has ended, the caller's own from now on.
@@ -143,10 +137,10 @@ class _Attempt:
         with self._lock:
             self._given_up = True
             session, self._session = self._session, None
+            if not self._ended.is_set():
+                atexit.register(self._end_before_exit)
         if session is not None:
             session.close()  # type: ignore[no-untyped-call]
-        if not self.is_over:
-            atexit.register(self._end_before_exit)
 
     def _open(self) -> None:
         try:
@@ -159,10 +153,14 @@ class _Attempt:
                 self._session, session = session, None
         if session is not None:
             session.close()  # type: ignore[no-untyped-call]
-        self._ended.set()
+        with self._lock:
+            self._ended.set()
+            # A process may wait for its router for days: what has ended is not kept until it exits.
+            atexit.unregister(self._end_before_exit)
 
     def _end_before_exit(self) -> None:
-        # A thread that comes back from Zenoh while the interpreter ends aborts the process.
+        # A thread that comes back from Zenoh while the interpreter ends aborts the process. When
+        # one that is long overdue comes back nobody knows, and many of them would add up.
         left_s = self._began_s + OPENING_MS / 1000 - time.monotonic()
         if abs(left_s) < _ENDING_S:
             self._thread.join(max(0.0, left_s) + _ENDING_S)

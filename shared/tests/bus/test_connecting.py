@@ -9,6 +9,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import pytest
 import zenoh
@@ -155,11 +156,15 @@ def test_beside_an_attempt_that_does_not_end_another_one_is_made(
 
     monkeypatch.setattr(connecting.zenoh, "open", first_one_late)
     monkeypatch.setattr(connecting, "_ATTEMPT_S", 0.2)
+    kept: set[object] = set()
+    to_exit = SimpleNamespace(register=kept.add, unregister=kept.discard)
+    monkeypatch.setattr(connecting, "atexit", to_exit)
     settings = BusSettings(router=router, connect_timeout_s=60)
     with connect(settings, LOG, lambda: False) as session:
         assert list(session.info.routers_zid())
+        assert kept
         go_on.set()
-        until(lambda: opened and opened[0].is_closed())
+        until(lambda: opened and opened[0].is_closed() and not kept)
         assert not session.is_closed()
 
 
