@@ -8,8 +8,10 @@ READY := $(VENV)/.synced
 MANIFESTS := uv.lock pyproject.toml deploy/install_uv.py $(wildcard */pyproject.toml */*/pyproject.toml)
 UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 
-# Their processes have deadlines to meet: one stack at a time, and nothing beside it.
+# Their processes have deadlines to meet: one stack at a time, nothing of ours beside it, and before
+# the rest of the machine. Who may not have that is told so by nice, and runs them all the same.
 WHOLE_STACKS := deploy/local/tests/demo $(addprefix tests/,bench end_to_end faults fuzz hosts)
+BEFORE_OTHERS := nice -n -10
 
 export OMP_NUM_THREADS ?= 1
 
@@ -28,7 +30,7 @@ demo: $(READY) ## teach the demo task, run the whole stack on held-out human mot
 test: $(READY) ## every test but those in a browser or in containers; linting, types and imports are among them
 	@$(RUN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile \
 	    -m "not containers and not browser" $(addprefix --ignore=,$(WHOLE_STACKS)) || failed=1; \
-	  $(RUN)/python -m pytest $(WHOLE_STACKS) || failed=1; exit $${failed:-0}
+	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(WHOLE_STACKS) || failed=1; exit $${failed:-0}
 
 lint: $(READY) ## put the code in the house's format and name what is left to mend
 	@$(RUN)/ruff format .
@@ -47,7 +49,7 @@ peers: $(READY) ## install the libraries that studies compare with, beside the r
 
 test-browser: $(READY) ## drive the operator's page in a chromium, with playwright installed beside the rest
 	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
-	@$(RUN)/python -m pytest -m browser tests/browser
+	@$(BEFORE_OTHERS) $(RUN)/python -m pytest -m browser tests/browser
 
 pictures: $(READY) ## take the pictures of the page that stand in docs/ anew, in a chromium
 	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python

@@ -39,6 +39,8 @@ PAGE_S = 60.0
 """A page without graphics hardware takes its time to be there."""
 START_S = 60.0
 """A browser beside them leaves services that come up little of the machine."""
+DRAG_S = 150.0
+"""What takes several movements of the mouse."""
 MANY_COLORS = 300
 GRIP_M = 0.13
 """Where an arrow of the handle is held, from its foot."""
@@ -47,16 +49,13 @@ LEFT = np.array([0.0, 1.0, 0.0])
 
 SLOW = ("--rate-hz", 5, "--lease-s", 2.0)
 """A page without graphics hardware draws few frames a second, and answers as seldom."""
+UNHURRIED = ("--physics-rate-hz", 120, "--state-rate-hz", 60)
+"""Of a robot beside a browser that draws without graphics hardware."""
 
 _FIELD_OF_VIEW = np.radians(75.0)
 _CAMERA_FROM_START_M = (0.6, -0.8, 0.5)
 _GRAB_S = 4.0
-DRAG_S = 150.0
-"""What takes several movements of the mouse."""
 _LOOK_S = 0.05
-
-UNHURRIED = ("--physics-rate-hz", 120, "--state-rate-hz", 60)
-"""Of a robot beside a browser that draws without graphics hardware."""
 
 
 class Heard:

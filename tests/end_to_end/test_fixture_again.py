@@ -69,7 +69,7 @@ def test_with_the_same_model_the_fixture_would_have_done_what_it_did(
     assert fixture.notes == ()
     figures = fixtures_compared(fixture)
     assert figures.compared > 0.7 * figures.ticks > 600
-    assert figures.guides_both > 0.3
+    assert figures.guides_both > 0.5
     assert alike_within_ticks(fixture) >= ALIKE
     assert figures.same_state >= ALIKE
     assert figures.directions_apart_deg < 1.0

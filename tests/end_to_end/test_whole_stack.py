@@ -75,14 +75,13 @@ def ways(watcher: Watcher) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return there - there[0], here - here[0]
 
 
-def test_without_recognition_the_robot_goes_where_the_hand_goes(perform: Perform) -> None:
+def test_without_recognition_the_robot_goes_exactly_where_the_hand_goes(perform: Perform) -> None:
     watcher = perform()
     hand, tool = ways(watcher)
     off_m = np.linalg.norm(tool - hand, axis=1)
-    # A process that waits for a processor holds a velocity for longer than the hand did. How exact
-    # it is on a quiet machine is measured by the bench.
-    assert np.sqrt((off_m**2).mean()) < 0.01
-    assert off_m[-1] < 0.01
+    # A process that waits for a processor makes the tool lag for a moment; nothing may add up.
+    assert np.sqrt((off_m**2).mean()) < 0.002
+    assert off_m[-1] < 0.005
     assert {r.body.reason for r in watcher.fixture if r.body.engaged} == {"no_belief"}
 
 

@@ -15,8 +15,8 @@ from hosts.network import WHY_NOT, Network, possible
 pytestmark = pytest.mark.skipif(not possible(), reason=WHY_NOT)
 
 STILL_FOR_S = 1.5
-"""So long after a link was cut nothing of what was under way before can be on its way, and whoever
-was at its ends has given it up."""
+"""Longer than a message can be under way, and than the lease of a link: the routers at the ends of
+one that was cut have closed it."""
 
 
 @pytest.fixture(scope="module")
