@@ -45,7 +45,7 @@ LOOK = """() => document.body.innerText + [...document.querySelectorAll("input")
   input => "\\n" + input.value).join("")"""
 KEPT_AS_NAMES = {("Belief", ("model_hash",)), ("Belief", ("clock",))}
 """By which beliefs are told apart."""
-TRIED = tuple(text for text in HOSTILE if re.search(r"ran|evil|display|passwd|\\*|\u202e", text))
+TRIED = tuple(text for text in HOSTILE if re.search(r"ran|evil|display|passwd|\*|\u202e", text))
 """Those that would do something in a browser; the others are tried without one."""
 DRAWN_S = 60.0
 PRESSED_AGAIN_S = 10.0
