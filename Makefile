@@ -9,7 +9,7 @@ MANIFESTS := uv.lock pyproject.toml deploy/install_uv.py $(wildcard */pyproject.
 UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 
 # Their processes have deadlines to meet: one stack at a time, nothing of ours beside it, and before
-# the rest of the machine. Who may not have that is told so by nice, and runs them all the same.
+# the rest of the machine. Without the right to that, nice warns and runs them all the same.
 WHOLE_STACKS := deploy/local/tests/demo $(addprefix tests/,bench end_to_end faults fuzz hosts)
 BEFORE_OTHERS := nice -n -10
 

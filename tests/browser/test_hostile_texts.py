@@ -6,6 +6,7 @@ for nothing to have happened; another test tries the policy by itself.
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable
@@ -120,15 +121,16 @@ def on_page(viewer: Viewer) -> str:
 def until_read(viewer: Viewer, text: str, after: str = "", press: str = "") -> None:
     """Wait, a button pressed, until a text can be read as it is, or as an error quotes it."""
     wanted = [after + " ".join(said.split()) for said in (plain(text), repr(text)[1:-1])]
+    press_s = time.monotonic() if press else math.inf
     deadline_s = time.monotonic() + DRAWN_S
-    again_s = time.monotonic() + PRESSED_AGAIN_S
-    if press:
-        viewer.press(press)
-    while not any(said in (told := on_page(viewer)) for said in wanted):
-        assert time.monotonic() < deadline_s, f"none of {wanted} can be read on {told!r}"
-        if press and time.monotonic() > again_s:
+    while True:
+        if time.monotonic() >= press_s:
             viewer.press(press)
-            again_s = time.monotonic() + PRESSED_AGAIN_S
+            press_s = time.monotonic() + PRESSED_AGAIN_S
+        told = on_page(viewer)
+        if any(said in told for said in wanted):
+            return
+        assert time.monotonic() < deadline_s, f"none of {wanted} can be read on {told!r}"
         viewer.cell.stack.elapse(AGAIN_S)
 
 

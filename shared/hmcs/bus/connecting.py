@@ -159,8 +159,8 @@ class _Attempt:
             atexit.unregister(self._end_before_exit)
 
     def _end_before_exit(self) -> None:
-        # A thread that comes back from Zenoh while the interpreter ends aborts the process. When
-        # one that is long overdue comes back nobody knows, and many of them would add up.
+        # A thread that comes back from Zenoh while the interpreter ends aborts the process. One
+        # that is long overdue may come back at any time, and waiting for many would add up.
         left_s = self._began_s + OPENING_MS / 1000 - time.monotonic()
         if abs(left_s) < _ENDING_S:
             self._thread.join(max(0.0, left_s) + _ENDING_S)
