@@ -104,7 +104,13 @@ def test_the_fixture_fades_to_free_motion_when_beliefs_stay_out(
     stack.until_ready(
         task,
         stack.start("gesteme_classifier", "a", "--model", model_file),
-        stack.start("fixture_controller", "f", "--models", json.dumps([str(model_file)])),
+        stack.start(
+            "fixture_controller",
+            "f",
+            *("--models", json.dumps([str(model_file)])),
+            # The hand is of this thread; a machine that stalls must not make it let go.
+            *("--input-stale-after-ms", 500),
+        ),
     )
     scene.drive(read_csv(performance_file))
     stack.until(lambda: watcher.fixture and watcher.fixture[-1].body.factor > 0.75)

@@ -10,6 +10,7 @@ import numpy as np
 from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step
 from support.hand import Hand, Scene
+from support.stack import PATIENT_FIXTURE
 
 REST = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
@@ -71,10 +72,10 @@ def test_a_second_fixture_controller_moves_nothing_until_the_first_is_gone(
 ) -> None:
     stack, watcher = scene.stack, scene.watcher
     robot = stack.bring_up("robot", "r")
-    first = stack.bring_up("fixture_controller", "first")
+    first = stack.bring_up("fixture_controller", "first", *PATIENT_FIXTURE)
     scene.drive(read_csv(performance_file))
     stack.until(lambda: watcher.robot and watcher.robot[-1].body.stop == "none")
-    second = stack.start("fixture_controller", "second")
+    second = stack.start("fixture_controller", "second", *PATIENT_FIXTURE)
     stack.until_ready(second)
     stack.until(lambda: stack.health(robot).refused.get("command", 0) > 20)
     # The robot has never been handed over; a machine that stalls may have stopped it.
