@@ -20,13 +20,14 @@ def main() -> int:
     parser.add_argument("--messages", type=int, default=1_000_000)
     parser.add_argument("--questions", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--logs", type=Path, help="folder for the logs, which are kept then")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="hmcs-fuzz-") as name, Progress() as progress:
         folder = Path(name)
         task = progress.add_task("hostile messages", total=arguments.messages)
         model, performance = taught(folder)
         with (
-            Stack(folder / "logs") as stack,
+            Stack(arguments.logs or folder / "logs") as stack,
             Besieged(stack, folder, model, performance) as besieged,
         ):
             verdict = besieged.siege(

@@ -14,8 +14,7 @@ import zenoh
 
 from fuzz.hostile import published, questions
 from hmcs.bus.config import BusSettings, client_config
-from hmcs.bus.messages import Ask, Health
-from hmcs.bus.verbs import HEALTH
+from hmcs.bus.messages import Health
 from support.stack import CELL, Stack
 from support.taught import MODEL
 
@@ -120,11 +119,7 @@ class Besieged:
 
     def health(self, service: str) -> Health | None:
         """Ask a service how it is; None where it does not answer in time."""
-        answers = HEALTH.ask(
-            self.bus, Ask(), service=service, instance=self.processes[service].instance,
-            timeout_s=ANSWERS_WITHIN_S,
-        )  # fmt: skip
-        return answers[0].body if answers else None
+        return self.stack.health_within(self.processes[service], ANSWERS_WITHIN_S)
 
     def _answers(self) -> Iterator[tuple[str, float]]:
         for service, process in self.processes.items():
