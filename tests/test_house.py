@@ -17,7 +17,12 @@ import yaml
 ROOT = Path(__file__).parent.parent
 TOOLS = Path(sys.executable).parent
 PACKAGES = sorted(
-    [ROOT / "shared/hmcs", *ROOT.glob("deploy/*/hmcs_*"), *ROOT.glob("services/*/hmcs_*")]
+    [
+        ROOT / "shared/hmcs",
+        ROOT / "shared/baselines/hmcs_baselines",
+        *ROOT.glob("deploy/*/hmcs_*"),
+        *ROOT.glob("services/*/hmcs_*"),
+    ]
 )
 FORBIDDEN_MODULES = {"pickle", "_pickle", "cPickle", "dill", "cloudpickle", "shelve"}
 

@@ -11,10 +11,9 @@ from hmcs.fixtures.tool_shape import tool_shape_of
 from hmcs.fixtures.trust import SegmentBelief
 from hmcs.fixtures.workspace import regions_of
 from hmcs.motion.steps import Step
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.layered import Precision
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.recognizer import Recognition, StepEvidence
+from hmcs.recognition.segment_filter.recognizer import Precision
 
 NS_PER_S = 1_000_000_000
 

@@ -11,9 +11,9 @@ from bench.figures import Figure, tell
 from hmcs.motion.chains import chained
 from hmcs.motion.lasa import read_drawing
 from hmcs.motion.steps import DeadZone
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.learning import learn
 from hmcs.recognition.scoring import NONE, Scores, midway_labels, score
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs.task import load_task
 
 ACCURACY = 0.985

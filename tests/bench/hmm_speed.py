@@ -11,11 +11,11 @@ from hmmlearn.hmm import GaussianHMM
 from numpy.typing import NDArray
 
 from bench.figures import Figure, tell
-from hmcs.recognition.hmm.bank import ForwardBank, GaussianScores
-from hmcs.recognition.hmm.batch import baum_welch_many
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.model import Hmm, sample
 from hmcs.recognition.hmm.topologies import fully_connected, left_right, start_anywhere, start_in
+from hmcs_baselines.hmm.bank import ForwardBank, GaussianScores
+from hmcs_baselines.hmm.batch import baum_welch_many
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from hmcs.bus.messages import Belief, Envelope, Evidence, Motion, Step
 from hmcs.bus.wire import decode, encode
 from hmcs.fixtures.controller import Controller, Safeguards
 from hmcs.motion.demonstrations import read_csv
-from hmcs.recognition.layered import TaskRecognizer, bank_of
 from hmcs.recognition.model_file import load_model
+from hmcs.recognition.segment_filter.recognizer import TaskRecognizer, bank_of
 from hmcs.translation import sample_of, step_of
 from hmcs_fixture_controller.translation import command_of, state_of
 from hmcs_input_device.playback import Passes, Playback

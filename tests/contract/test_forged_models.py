@@ -19,7 +19,7 @@ from hmcs.recognition.content import taken_apart
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import ModelFileError, check_model, load_model, save_model
-from hmcs.recognition.recognizers import kinds, recognizer_of
+from hmcs.recognition.registry import kinds, recognizer_of
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 NAMES = [kind.name for kind in kinds()]

@@ -12,7 +12,7 @@ from hmcs.bus.messages import Belief
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
-from hmcs.recognition.recognizers import kinds, recognizer_of
+from hmcs.recognition.registry import kinds, recognizer_of
 from hmcs.translation import belief_message
 from hmcs_local.swap import activate, load
 from support.hand import Scene

@@ -10,9 +10,9 @@ import pytest
 
 from hmcs.bus.messages import Belief
 from hmcs.motion.steps import Step
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from support.hand import Scene, told
 
 PATIENT = ("--deadline-ms", "1000")

@@ -10,8 +10,8 @@ import psutil
 
 from hmcs.bus.messages import Belief, Evidence
 from hmcs.motion.steps import Step
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs.translation import step_of
 from support.hand import Watcher
 from support.stack import PATIENT_FIXTURE, PATIENT_ROBOT, Stack

@@ -13,9 +13,9 @@ import pytest
 from hmcs.fixtures.compliance import FREE_FACTOR
 from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from support.hand import Scene
 
 PATIENT = ("--deadline-ms", 250)

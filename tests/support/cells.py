@@ -16,7 +16,7 @@ from hmcs.fixtures.controller import Controller
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import DeadZone
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
 from hmcs.recordings.parts import Preface, Recording
 from hmcs.recordings.plain import fields_of
 from hmcs.translation import belief_message, guides_of, sample_of, segment_belief_of, step_of

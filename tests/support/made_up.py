@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hmcs.recognition.exits import DEFAULT_WEIGHTS
-from hmcs.recognition.gestemes import GestemeParameters, Scoring
-from hmcs.recognition.layered import Layers
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter import FilterSettings
-from hmcs.recognition.senses import Senses
+from hmcs.recognition.segment_filter.exits import DEFAULT_WEIGHTS
+from hmcs.recognition.segment_filter.filter import FilterSettings
+from hmcs.recognition.segment_filter.gestemes import GestemeParameters, Scoring
+from hmcs.recognition.segment_filter.recognizer import Layers
+from hmcs.recognition.segment_filter.senses import Senses
 from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
 

@@ -578,7 +578,7 @@ def recognizers(
     ] = None,
 ) -> None:
     """List the recognizers a model can be learned for, with a line and the source of each."""
-    from hmcs.recognition.recognizers import kind_named, kinds
+    from hmcs.recognition.registry import kind_named, kinds
     from hmcs_local.recognizers import show_kind, show_kinds
 
     if name is None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from hmcs.recognition.recognizers import Kind, setting_values
+from hmcs.recognition.registry import Kind, setting_values
 
 
 def show_kinds(kinds: Sequence[Kind], console: Console) -> None:

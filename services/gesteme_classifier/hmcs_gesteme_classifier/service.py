@@ -11,8 +11,8 @@ from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.model_signing import signed_by
-from hmcs.recognition.layered import bank_of, layers_of
 from hmcs.recognition.model_file import load_model
+from hmcs.recognition.segment_filter.recognizer import bank_of, layers_of
 from hmcs.translation import evidence_message, step_of
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
 from hmcs_gesteme_classifier.shares import share_of

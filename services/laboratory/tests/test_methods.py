@@ -10,8 +10,6 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from hmcs.errors import UserError
-from hmcs.recognition.single_gestemes import scores
-from hmcs.recognition.single_gestemes_learning import learn_single
 from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import CurveSettings
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
@@ -21,6 +19,8 @@ from hmcs_laboratory.methods.online import followed, learned
 from hmcs_laboratory.methods.registered import ONLINE_PEERS, WHOLE
 from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.methods.windows import Window
+from hmcs_laboratory.single_gestemes.learning import learn_single
+from hmcs_laboratory.single_gestemes.model import scores
 
 SETTINGS = CurveSettings()
 FEW = 4

@@ -9,7 +9,7 @@ from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
-from hmcs.recognition.recognizers import kind_named, recognizer_of
+from hmcs.recognition.registry import kind_named, recognizer_of
 from hmcs.translation import belief_message, evidence_message, step_of
 
 

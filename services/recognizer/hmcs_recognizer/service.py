@@ -17,7 +17,7 @@ from hmcs.bus.verbs import LOAD_MODEL
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
 from hmcs_recognizer.hosted import Hosted
 from hmcs_recognizer.settings import RecognizerSettings
 

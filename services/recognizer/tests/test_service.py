@@ -18,7 +18,7 @@ from hmcs.bus.service import Service
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import ModelFileError, save_model
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
 from hmcs_recognizer.service import RecognizerService
 from hmcs_recognizer.settings import RecognizerSettings
 from support.hand import Scene

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hmcs.recognition.gestemes import StepEvidence
+from hmcs.recognition.recognizer import StepEvidence
 
 Verdict = Literal["taken", "duplicate", "late"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hmcs.bus.messages import Evidence
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.layered import layers_of
 from hmcs.recognition.model import Model
+from hmcs.recognition.recognizer import StepEvidence
+from hmcs.recognition.segment_filter.recognizer import layers_of
 
 
 class UnusableEvidenceError(ValueError):

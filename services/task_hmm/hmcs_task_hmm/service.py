@@ -12,8 +12,8 @@ from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
 from hmcs.model_signing import signed_by
-from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.recognition.model_file import load_model
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, TaskRecognizer, layers_of
 from hmcs.translation import belief_message, step_of
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence

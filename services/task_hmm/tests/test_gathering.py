@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.recognition.gestemes import StepEvidence
+from hmcs.recognition.recognizer import StepEvidence
 from hmcs_task_hmm.gathering import Gathering
 
 DEADLINE_NS = 20

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from hmcs.bus.service import run
 from hmcs.errors import UserError
-from hmcs.recognition.recognizers import DEFAULT
+from hmcs.recognition.registry import DEFAULT
 from hmcs.task import load_task
 from hmcs_trainer.performance import perform
 from hmcs_trainer.service import Trainer

@@ -15,7 +15,7 @@ from hmcs.bus.keys import KeyNameError, check_name
 from hmcs.bus.messages import Train
 from hmcs.bus.session import RequestRefusedError
 from hmcs.errors import UserError
-from hmcs.recognition.recognizers import DEFAULT, kind_named
+from hmcs.recognition.registry import DEFAULT, kind_named
 from hmcs.recordings.parts import SUFFIX as RECORDING
 from hmcs.task import shipped_tasks
 from hmcs_trainer.references import is_drawing

@@ -12,7 +12,7 @@ import yaml
 
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.recognition.unlabeled import UnlabeledSettings, discover, labeled
+from hmcs.recognition.discovery.unlabeled import UnlabeledSettings, discover, labeled
 from hmcs.recordings.demonstrations import stretches_of
 from hmcs.recordings.found import is_as_found, marked
 from hmcs.recordings.labels import How, how_labeled, labels_beside, labels_of, write_labels

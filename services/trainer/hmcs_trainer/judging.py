@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.scoring import NONE, Scores, pooled, score
 from hmcs.recognition.segments import LearningError, labeled_steps
 from hmcs.task import Task

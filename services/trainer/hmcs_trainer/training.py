@@ -13,7 +13,7 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import check_model, save_model
-from hmcs.recognition.recognizers import DEFAULT, kind_named, settings_of
+from hmcs.recognition.registry import DEFAULT, kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.selection import choose
 from hmcs.task import Task, load_task

@@ -8,7 +8,7 @@ import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.disagreement import check_agreement, turn_agreement
-from hmcs.recognition.gestemes import LONGEST_WINDOW_STEPS
+from hmcs.recognition.segment_filter.gestemes import LONGEST_WINDOW_STEPS
 from hmcs.recognition.segments import (
     Array,
     LearningError,

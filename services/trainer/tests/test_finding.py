@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hmcs.bus.messages import Motion
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
-from hmcs.recognition.recognizers import DEFAULT
+from hmcs.recognition.registry import DEFAULT
 from hmcs.recognition.segments import LearningError
 from hmcs.recordings import plain
 from hmcs.recordings.labels import labels_beside, labels_of

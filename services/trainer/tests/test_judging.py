@@ -10,7 +10,7 @@ import pytest
 
 from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.recognition.learning import learn
-from hmcs.recognition.recognizers import DEFAULT
+from hmcs.recognition.registry import DEFAULT
 from hmcs.recognition.segments import LearningError
 from hmcs.task import find_task, load_task
 from hmcs_trainer.advice import advice

@@ -12,7 +12,7 @@ from hmcs.motion.paths import mean_path
 from hmcs.motion.turns import mean_turns
 from hmcs.recognition.disagreement import turn_agreement
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import DEFAULT, Lesson, kind_named
+from hmcs.recognition.registry import DEFAULT, Lesson, kind_named
 from hmcs.recognition.segments import Array, LearningError, Segment, segments_of
 from hmcs.task import Task
 

@@ -29,7 +29,7 @@ from hmcs.recognition.content import (
 )
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_archive import ARRAYS, MANIFEST, MOST_BYTES, Archive, ArchiveError
-from hmcs.recognition.recognizers import kind_named
+from hmcs.recognition.registry import kind_named
 from hmcs.task import Task
 from hmcs.task.values import Name
 from hmcs.whole_files import written_whole

@@ -11,14 +11,52 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.segment_filter import TaskBelief
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int32]
 
 _log = logging.getLogger(__name__)
 _TOLERANCE = 1e-3
 """How far the sum of probabilities may be from one."""
+
+
+class StepEvidence(NamedTuple):
+    """What gesteme models make of one step: a sparse list of living (gesteme, start) pairs."""
+
+    step: int
+    """t."""
+    gestemes: tuple[int, ...]
+    """Indices into the model of the gestemes held, with or without a living pair."""
+    pair_gesteme: Integers
+    """Index into the model, shape (p,)."""
+    pair_start: Integers
+    """Start step s, shape (p,); pairs are ordered by start, then gesteme."""
+    exit: Array
+    """P(leaving before step t | steps s..t−1), 0 for s = t, shape (p,)."""
+    log_ratio: Array
+    """Tempered log-likelihood ratio of step t to the background given no exit, shape (p,)."""
+
+
+class TaskBelief(NamedTuple):
+    """What is believed after a step."""
+
+    step: int
+    """t."""
+    states: Array
+    """P(state | steps 0..t), shape (S,)."""
+    unknown: float
+    """P(no part of the task | steps 0..t)."""
+    gesteme: int
+    """Index of the most probable gesteme of the most probable state."""
+    segment_start: int
+    """The most probable start step of the most probable state's segment."""
+    log_likelihood: float
+    """log P(step t | steps 0..t−1) against the background level, nats."""
+    missing: tuple[int, ...]
+    """Indices of the task's gestemes that no evidence came for."""
 
 
 class Recognition(NamedTuple):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import kind_named, recognizer_of, settings_of
+from hmcs.recognition.registry import kind_named, recognizer_of, settings_of
 from hmcs.recognition.segments import LearningError, labeled_steps
 from hmcs.task import Task
 

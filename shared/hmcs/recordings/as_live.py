@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.layered import LayeredRecognizer, Layers, Precision, TaskRecognizer
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Guarded, Recognition, Recognizer
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.recognizer import Guarded, Recognition, Recognizer, StepEvidence
+from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.segment_filter.recognizer import (
+    LayeredRecognizer,
+    Layers,
+    Precision,
+    TaskRecognizer,
+)
 
 
 class AsLive:

@@ -6,12 +6,12 @@ import pytest
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.content import taken_apart
-from hmcs.recognition.gesteme_learning import LearningSettings, fit_gestemes
-from hmcs.recognition.gestemes import GestemeBank, Scoring
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.learning import learn
+from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings, fit_gestemes
+from hmcs.recognition.segment_filter.gestemes import GestemeBank, Scoring
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.variants import VariantSettings
 from hmcs.recognition.segments import LearningError, Segment, segments_of
-from hmcs.recognition.variants import VariantSettings
 from hmcs.task import Task
 
 ORDER = ["along", "round", "up", "along", "round", "up"]

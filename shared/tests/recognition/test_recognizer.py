@@ -7,9 +7,8 @@ import pytest
 
 from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import BadStepError, Guarded, Recognition
-from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recognition.segment_filter import TaskBelief
+from hmcs.recognition.recognizer import BadStepError, Guarded, Recognition, TaskBelief
+from hmcs.recognition.registry import recognizer_of
 
 STATES = 3
 
@@ -135,7 +134,9 @@ def test_a_real_recognizer_that_failed_finds_its_place_in_the_task_again(
     for step in steps[:half]:
         recognizer.step(step)
     with monkeypatch.context() as broken:
-        broken.setattr("hmcs.recognition.gestemes.exit_probability", lambda *_: 1 / 0)
+        broken.setattr(
+            "hmcs.recognition.segment_filter.gestemes.exit_probability", lambda *_: 1 / 0
+        )
         with pytest.raises(ZeroDivisionError):
             recognizer.step(steps[half])
     beliefs = [recognizer.step(step).belief for step in steps[half + 1 :]]

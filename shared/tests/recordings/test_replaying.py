@@ -11,12 +11,11 @@ import pytest
 
 from hmcs.bus.messages import Belief, Step
 from hmcs.bus.wire import encode
-from hmcs.recognition.gestemes import StepEvidence
-from hmcs.recognition.layered import LayeredRecognizer, TaskRecognizer
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
-from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.recognizer import Recognition, StepEvidence
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, TaskRecognizer
 from hmcs.recordings.comparing import compared
 from hmcs.recordings.guiding import guided
 from hmcs.recordings.parts import Preface, Recording

@@ -10,9 +10,9 @@ import pytest
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import steps_of
-from hmcs.recognition.layered import LayeredRecognizer
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
+from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs.task import load_task
 from hmcs_local.demo.measure import Measured, measure
 from hmcs_local.demo.recording import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hmcs.fixtures.rules import Rules, rules_of
-from hmcs.recognition.recognizers import DEFAULT
+from hmcs.recognition.registry import DEFAULT
 from hmcs.task import FixtureSetup, Task
 
 DEFAULT_LAW = "insistence"

@@ -21,7 +21,7 @@ from hmcs.motion.leading import leading_hand
 from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
 from hmcs_laboratory.assistance.robots import SimulatedRobot, robot_of
 from hmcs_laboratory.assistance.scenarios import Scenario, Taught
 

@@ -17,14 +17,14 @@ from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, shapes
 from hmcs.motion.steps import Step
-from hmcs.recognition.clustering import assign
-from hmcs.recognition.recognizers.direction_states import (
+from hmcs.task.model import unknown
+from hmcs_baselines.clustering import assign
+from hmcs_baselines.direction_states import (
     DirectionFilter,
     DirectionStates,
     learn_directions,
     thesis_settings,
 )
-from hmcs.task.model import unknown
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, line_task
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task

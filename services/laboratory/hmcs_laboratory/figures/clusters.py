@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hmcs.recognition.clustering import k_means
-from hmcs.recognition.elbow import (
+from hmcs_baselines.clustering import k_means
+from hmcs_baselines.elbow import (
     ClusterSearch,
     CusumSettings,
     Elbow,

@@ -14,9 +14,9 @@ from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import kind_named, settings_of
-from hmcs.recognition.recognizers.direction_states import DirectionFilter, unit_rows
-from hmcs.recognition.recognizers.estimators import likelihoods
+from hmcs.recognition.registry import kind_named, settings_of
+from hmcs_baselines.direction_states import DirectionFilter, unit_rows
+from hmcs_baselines.estimators import likelihoods
 from hmcs_laboratory.assistance.laws import LAWS
 from hmcs_laboratory.assistance.loop import Run, assisted, demonstrated
 from hmcs_laboratory.assistance.measures import off_path

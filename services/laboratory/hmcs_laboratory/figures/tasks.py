@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recognition.recognizers.classifying import GestemeClassifier
-from hmcs.recognition.recognizers.gesteme_hmms import GestemeHmmSettings
-from hmcs.recognition.recognizers.layered_hmm import LayeredHmmSettings
-from hmcs.recognition.recognizers.observing import ObservationSettings
-from hmcs.recognition.recognizers.task_level import TaskLevelSettings
-from hmcs.recognition.recognizers.two_levels import TwoLevels
+from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.scoring import Scores, pooled, score
+from hmcs_baselines.classifying import GestemeClassifier
+from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
+from hmcs_baselines.layered_hmm import LayeredHmmSettings
+from hmcs_baselines.observing import ObservationSettings
+from hmcs_baselines.task_level import TaskLevelSettings
+from hmcs_baselines.two_levels import TwoLevels
 from hmcs_laboratory.data.hands import Count, Share
 from hmcs_laboratory.data.synthetic_tasks import five_states
 from hmcs_laboratory.data.tasks import Performance, TaskSet

@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step
-from hmcs.recognition.hmm.bank import ForwardBank, GaussianScores
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.learning import EMISSION, baum_welch
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.hmm.topologies import left_right, start_in
 from hmcs.recognition.model import axes_of
-from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.recognizer import Recognition, TaskBelief
 from hmcs.recognition.scoring import NONE
-from hmcs.recognition.segment_filter import TaskBelief
 from hmcs.recognition.segments import segments_of
 from hmcs.task import Task
+from hmcs_baselines.hmm.bank import ForwardBank, GaussianScores
 from hmcs_laboratory.data.tasks import as_performance, path_of
 from hmcs_laboratory.methods.features import directions
 from hmcs_laboratory.methods.online import Fresh

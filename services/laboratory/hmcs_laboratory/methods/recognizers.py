@@ -8,7 +8,7 @@ import numpy as np
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
-from hmcs.recognition.recognizers import kind_named, recognizer_of, settings_of
+from hmcs.recognition.registry import kind_named, recognizer_of, settings_of
 from hmcs.task import Task
 from hmcs_laboratory.methods.online import Fresh, OnlineMethod
 

@@ -22,7 +22,7 @@ from hmcs_laboratory.methods.whole import WholeMethod
 from hmcs_laboratory.study import known_once
 
 WHOLE = (
-    WholeMethod("hmcs-gestemes", "hmcs.recognition.single_gestemes", fit_single),
+    WholeMethod("hmcs-gestemes", "hmcs_laboratory.single_gestemes.model", fit_single),
     WholeMethod(
         "hmcs-gestemes-share",
         "the same, told which share of the motion it sees, as DTW, MiniRocket, SVM and LDA are",
@@ -43,7 +43,7 @@ WHOLE = (
 """Methods that classify a whole gesteme."""
 
 RECOGNIZERS = (
-    recognizer("segment-filter", "hmcs.recognition.segment_filter"),
+    recognizer("segment-filter", "hmcs.recognition.segment_filter.filter"),
     recognizer(
         "segment-filter",
         "the same, each gesteme aligned in size and turn while it is performed",

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.recognition.single_gestemes import SingleGestemes, scores
-from hmcs.recognition.single_gestemes_learning import learn_single
 from hmcs_laboratory.methods.whole import Examples
+from hmcs_laboratory.single_gestemes.learning import learn_single
+from hmcs_laboratory.single_gestemes.model import SingleGestemes, scores
 
 Array = NDArray[np.float64]
 

@@ -13,13 +13,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.recognition.hmm.bank import ForwardBank
-from hmcs.recognition.hmm.batch import baum_welch_many
 from hmcs.recognition.hmm.emissions import Discrete, MultiDiscrete
 from hmcs.recognition.hmm.learning import baum_welch
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.hmm.topologies import left_right, start_in
-from hmcs.recognition.symbols import (
+from hmcs_baselines.hmm.bank import ForwardBank
+from hmcs_baselines.hmm.batch import baum_welch_many
+from hmcs_baselines.symbols import (
     Bins,
     Codebook,
     Fourier,

@@ -12,7 +12,7 @@ from pydantic import AfterValidator
 from hmcs.motion.closed_loop_operators import PRESETS, ClosedLoopOperator
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizers import kind_named, settings_of
+from hmcs.recognition.registry import kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs_laboratory.assistance.laws import DEFAULT_LAW, LAWS, AssistLaw
 from hmcs_laboratory.assistance.loop import Run, assisted, demonstrated

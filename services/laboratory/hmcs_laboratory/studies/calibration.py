@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hmcs.recognition.calibration import all_classes_error, brier_score, reliability
 from hmcs.recognition.scoring import NONE
+from hmcs_laboratory.calibration import all_classes_error, brier_score, reliability
 from hmcs_laboratory.data.drawn_tasks import any_order, fixed_order
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states, six_segments

@@ -16,25 +16,25 @@ from sklearn.metrics import silhouette_score
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step
-from hmcs.recognition.directions import (
-    DirectionSettings,
-    FoundDirections,
-    distinct_directions,
-    elbow_directions,
-    find_directions,
-)
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import axes_of
-from hmcs.recognition.recognizers import recognizer_of
-from hmcs.recognition.recognizers.direction_states import (
+from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.scoring import pooled, score
+from hmcs.task import Task
+from hmcs_baselines.direction_states import (
     DirectionFilter,
     DirectionStateSettings,
     learn_directions,
     thesis_settings,
     unit_rows,
 )
-from hmcs.recognition.scoring import pooled, score
-from hmcs.task import Task
+from hmcs_baselines.directions import (
+    DirectionSettings,
+    FoundDirections,
+    distinct_directions,
+    elbow_directions,
+    find_directions,
+)
 from hmcs_laboratory.data.hands import Count, NotNegative, Share
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, line_task
 from hmcs_laboratory.data.tasks import Performance, TaskSet, as_performance, path_of, plain_task

@@ -12,10 +12,10 @@ from pydantic import Field
 from sklearn.metrics import roc_auc_score
 
 from hmcs.motion.steps import Step, steps_of
-from hmcs.recognition.layered import layers_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.recognizer import Recognition
-from hmcs.recognition.recognizers import recognizer_of
+from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.segment_filter.recognizer import layers_of
 from hmcs_laboratory.data.drawn_tasks import fixed_order
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states

@@ -14,19 +14,19 @@ from pydantic import Field, model_validator
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, read_drawing
-from hmcs.recognition.agreement import (
+from hmcs.recognition.discovery.order_cuts import CutSettings
+from hmcs.recognition.discovery.task_states import task_states
+from hmcs.recognition.discovery.unlabeled import UnlabeledSettings, discover, labeled
+from hmcs.recognition.model import axes_of
+from hmcs.recognition.segments import LabeledSteps, labeled_steps
+from hmcs.task import Task, load_task
+from hmcs_baselines.directions import elbow_directions, find_directions
+from hmcs_laboratory.agreement import (
     adjusted_rand_index,
     boundaries_of,
     boundary_agreement,
     pooled_agreement,
 )
-from hmcs.recognition.directions import elbow_directions, find_directions
-from hmcs.recognition.model import axes_of
-from hmcs.recognition.order_cuts import CutSettings
-from hmcs.recognition.segments import LabeledSteps, labeled_steps
-from hmcs.recognition.task_states import task_states
-from hmcs.recognition.unlabeled import UnlabeledSettings, discover, labeled
-from hmcs.task import Task, load_task
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
 from hmcs_laboratory.data.tasks import path_of

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmcs.errors import UserError
-from hmcs.recognition.hmm.batch import baum_welch_many
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, Mixture
 from hmcs.recognition.hmm.inference import (
     backward_scaled,
@@ -20,12 +19,13 @@ from hmcs.recognition.hmm.inference import (
     shortest_path,
     smooth,
 )
-from hmcs.recognition.hmm.layered import Layer, LayeredFilter
 from hmcs.recognition.hmm.learning import baum_welch, segmental_k_means
 from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.hmm.model import Hmm, posterior, validate
-from hmcs.recognition.hmm.semi_markov import decoded, duration_hmm, filtered, smoothed
 from hmcs.recognition.hmm.topologies import left_right, start_in
+from hmcs_baselines.hmm.batch import baum_welch_many
+from hmcs_baselines.hmm.layered import Layer, LayeredFilter
+from hmcs_baselines.hmm.semi_markov import decoded, duration_hmm, filtered, smoothed
 
 OFFSETS = [0.0, 1e3, 1e7, 1e9, 1e12]
 seeds = st.integers(0, 10_000)

@@ -1,0 +1,1 @@
+"""Classification of single gestemes by models in closed loop, as the drawings study compares."""

@@ -1,0 +1,1 @@
+"""Recognizers of the literature, each a kind that `hmcs train --recognizer` knows by its name."""

@@ -1,0 +1,90 @@
+"""Hundtofte's network of gesteme HMMs: offline segmentation, and online filtering beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hmcs.motion.steps import Step
+from hmcs.recognition.believing import Believer
+from hmcs.recognition.model import Model, axes_of
+from hmcs.recognition.recognizer import Recognition, Recognizer
+from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.task_chain import chain_of
+from hmcs_baselines.concatenated import (
+    Network,
+    NetworkKnowledge,
+    NetworkScores,
+    NetworkSettings,
+    Piece,
+    check_network,
+    joined,
+    learn_network,
+    pieces,
+)
+from hmcs_baselines.hmm.bank import ForwardBank
+
+
+def segment(model: Model, steps: Sequence[Step], *, anywhere: bool = False) -> list[Piece]:
+    """Return the pieces of a whole motion: (state, start, stop) by the index of the step.
+
+    This is what the paper does. With `anywhere` the motion may begin in any state.
+    Raises ValueError where there are no steps.
+    """
+    if not steps:
+        raise ValueError("no steps to segment: give one at least")
+    network, scores = _network(model, anywhere)
+    first = steps[0].index
+    return [
+        Piece(state, first + start, first + stop)
+        for state, start, stop in pieces(
+            network, np.stack([scores.log_emission(step) for step in steps])
+        )
+    ]
+
+
+class GestemeNetwork:
+    """Filters the state of the network, step by step."""
+
+    def __init__(self, model: Model, *, anywhere: bool) -> None:
+        """Begin as the task does or, with `anywhere`, in any of its states."""
+        self._network, self._scores = _network(model, anywhere)
+        self._filter = ForwardBank(self._network.initial[None], self._network.transition[None])
+        self._cells = (len(model.task.states), len(model.task.gestemes))
+        self._believer = Believer()
+
+    def step(self, step: Step) -> Recognition:
+        """Take the next step; steps come in order, without gaps."""
+        gain = self._filter.step(self._scores.log_emission(step)[None])
+        cells = np.zeros(self._cells)
+        np.add.at(cells, (self._network.task_state, self._network.gesteme), self._filter.states[0])
+        return self._believer.recognition(step.index, cells.sum(axis=1), cells, float(gain[0]))
+
+
+def _network(model: Model, anywhere: bool) -> tuple[Network, NetworkScores]:
+    network = joined(model.knowledge, chain_of(model.task, anywhere=anywhere))
+    return network, NetworkScores(model.knowledge, network, model.axes, model.task.dead_zone_m)
+
+
+def _learn(lesson: Lesson) -> NetworkKnowledge:
+    task = lesson.task
+    return learn_network(
+        lesson.segments, len(task.gestemes), axes_of(task), task.dead_zone_m, lesson.settings
+    )
+
+
+def _recognizer(model: Model, anywhere: bool) -> Recognizer:
+    return GestemeNetwork(model, anywhere=anywhere)
+
+
+KIND = Kind(
+    name="gesteme-network",
+    summary="Gaussian gesteme HMMs joined by the task's network into one, filtered online",
+    source="Hundtofte, Hager & Okamura 2002, as Aarno 2007, 2.3 describes it; online is ours",
+    settings=NetworkSettings,
+    knowledge=NetworkKnowledge,
+    learn=_learn,
+    recognizer=_recognizer,
+    check=check_network,
+)

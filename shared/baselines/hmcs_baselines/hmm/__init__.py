@@ -1,0 +1,1 @@
+"""Hidden Markov models beyond what the default recognizer needs; see TUTORIAL.md."""

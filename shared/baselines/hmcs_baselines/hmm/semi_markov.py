@@ -1,0 +1,239 @@
+"""Explicit durations: how long a state lasts has a distribution of its own (hidden semi-Markov).
+
+A stay in state i of an ordinary HMM lasts d steps with probability A[i, i]^(d−1)·(1 − A[i, i]): the
+shortest stay is the most probable. Here a stay is a segment whose duration is drawn on entry, and
+the model is an exact HMM over (state, steps that remain). `expand` builds that HMM; `filtered`,
+`smoothed` and `decoded` walk its structural zeros directly, O(N² + N·D) a step instead of O(N²·D²).
+Source: Rabiner 1989, IV.D.
+Shapes: N states, T observations, D the longest duration, steps.
+The last segment may go on after the last observation: what is seen of it counts as P(at least so
+long).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hmcs.recognition.hmm.inference import ImpossibleSequenceError
+from hmcs.recognition.hmm.log_transitions import log_of
+from hmcs_baselines.hmm.durations import DurationError
+from hmcs_baselines.hmm.markov import Array, States, checked_rows
+
+
+class DurationHmm(NamedTuple):
+    """A chain of segments; made and checked by `duration_hmm`."""
+
+    initial: Array
+    """P(state of the first segment), shape (N,)."""
+    transition: Array
+    """P(state of the next segment | state of this one), shape (N, N). A row may sum to less than
+    one: what is missing is the probability that the process ends with the segment."""
+    durations: Array
+    """P(segment lasts d + 1 steps | state), shape (N, D)."""
+
+
+class Expanded(NamedTuple):
+    """The same process as an ordinary HMM over N·D pairs (state, steps that remain)."""
+
+    initial: Array
+    """Shape (N·D,)."""
+    transition: Array
+    """Shape (N·D, N·D)."""
+    state: States
+    """The state of each pair, shape (N·D,): emissions are those of the state."""
+    remaining: States
+    """Steps that remain, this one included, shape (N·D,)."""
+
+
+class Filtered(NamedTuple):
+    """What is known while observations come in."""
+
+    states: Array
+    """P(state i at t | observations 0..t), shape (T, N)."""
+    log_likelihoods: Array
+    """log P(observation t | observations 0..t−1), shape (T,)."""
+
+
+class Segment(NamedTuple):
+    """A segment of the most probable segmentation."""
+
+    state: int
+    first: int
+    """Its first step."""
+    steps: int
+    """How many of the observed steps it covers."""
+
+
+class Segmentation(NamedTuple):
+    """The most probable segmentation."""
+
+    segments: tuple[Segment, ...]
+    states: States
+    """The state at each step, shape (T,)."""
+    log_probability: float
+    """log P(segments, observations), the duration of the last segment a part of the segmentation
+    also where it reaches beyond the observations."""
+
+
+def duration_hmm(initial: ArrayLike, transition: ArrayLike, durations: ArrayLike) -> DurationHmm:
+    """Return the model of initial (N,), transition (N, N) and duration (N, D) probabilities.
+
+    Raises MarkovModelError when a shape is wrong or a row is no probability distribution.
+    """
+    spread = checked_rows(durations, "durations", columns=None)
+    count = len(spread)
+    start = checked_rows(np.asarray(initial, dtype=float)[None], "initial", count)[0]
+    chain = checked_rows(transition, "transition", count, leaving=True)
+    if len(chain) != count:
+        raise DurationError(f"transition has {len(chain)} rows, durations {count}: one per state")
+    return DurationHmm(start, chain, spread)
+
+
+def expand(model: DurationHmm) -> Expanded:
+    """Return the same process as an HMM with structural zeros: r → r − 1, and out at r = 1."""
+    count, longest = model.durations.shape
+    initial = (model.initial[:, None] * model.durations).ravel()
+    transition = np.zeros((count, longest, count, longest))
+    transition[:, 0] = model.transition[:, :, None] * model.durations
+    here, below = np.arange(count)[:, None], np.arange(longest - 1)
+    transition[here, below + 1, here, below] = 1.0
+    state, remaining = np.divmod(np.arange(count * longest), longest)
+    return Expanded(
+        initial, transition.reshape(count * longest, count * longest), state, remaining + 1
+    )
+
+
+def filtered(model: DurationHmm, log_emission: Array) -> Filtered:
+    """Return the state probabilities step by step, given log P(o_t | state i), shape (T, N).
+
+    Raises DurationError for a wrong shape, ImpossibleSequenceError for observations that the model
+    gives no probability.
+    """
+    passed = _forward(model, log_emission)
+    return Filtered(_states_of(passed.log_states), passed.log_scales)
+
+
+def smoothed(model: DurationHmm, log_emission: Array) -> Array:
+    """Return γ: P(state i at t | all observations), shape (T, N). Raises as `filtered`."""
+    log_alpha, _, tops = _forward(model, log_emission)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
+    log_beta = np.zeros_like(log_alpha)
+    for t in range(len(log_emission) - 2, -1, -1):
+        ahead = (log_emission[t + 1] - tops[t + 1])[:, None] + log_beta[t + 1]
+        ahead = np.where(np.isfinite(log_alpha[t + 1]), ahead, -np.inf)
+        entered = np.logaddexp.reduce(log_durations + ahead, axis=1)
+        log_beta[t, :, 0] = np.logaddexp.reduce(log_transition + entered, axis=1)
+        log_beta[t, :, 1:] = ahead[:, :-1]
+        log_beta[t] -= log_beta[t].max(where=np.isfinite(log_alpha[t]), initial=-np.inf)
+    return _states_of(log_alpha + log_beta)
+
+
+def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
+    """Return the most probable segmentation; where entering a state is as probable as staying, it
+    stays. Raises as `filtered`.
+    """
+    _check_emission(model, log_emission)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
+    steps = len(log_emission)
+    best, log_probability = log_of(model.initial)[:, None] + log_durations, 0.0
+    entered_from = np.full((steps, *best.shape), -1, dtype=np.int64)
+    for t in range(steps):
+        if t:
+            leaving = best[:, :1] + log_transition
+            entered = leaving.max(axis=0)[:, None] + log_durations
+            stayed = _remaining_less(best)
+            entered_from[t] = np.where(entered > stayed, leaving.argmax(axis=0)[:, None], -1)
+            best = np.maximum(entered, stayed)
+        best = best + log_emission[t][:, None]
+        top = float(best.max())
+        if not np.isfinite(top):
+            raise _impossible(t)
+        # What all have in common is set apart: beside it the differences would be lost.
+        best, log_probability = best - top, log_probability + top
+    state, remaining = divmod(int(best.argmax()), best.shape[1])
+    path = np.empty(steps, dtype=np.int64)
+    firsts = []
+    for t in range(steps - 1, -1, -1):
+        path[t] = state
+        origin = int(entered_from[t, state, remaining])
+        if t == 0 or origin >= 0:
+            firsts.append(t)
+            state, remaining = origin, 0
+        else:
+            remaining += 1
+    bounds = [*reversed(firsts), steps]
+    segments = tuple(
+        Segment(int(path[first]), first, after - first) for first, after in pairwise(bounds)
+    )
+    return Segmentation(segments, path, log_probability)
+
+
+class _Forward(NamedTuple):
+    log_states: Array
+    """log P(state i with r steps that remain at t | o_0..o_t), shape (T, N, D)."""
+    log_scales: Array
+    """log P(o_t | o_0..o_{t−1}), shape (T,)."""
+    tops: Array
+    """Largest log P(o_t | state) of the states that can be reached, shape (T,)."""
+
+
+def _forward(model: DurationHmm, log_emission: Array) -> _Forward:
+    """Filter in logarithms, each step by its own scale."""
+    _check_emission(model, log_emission)
+    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
+    log_states = np.empty((len(log_emission), *log_durations.shape))
+    log_scales, tops = np.empty((2, len(log_emission)))
+    entered = log_of(model.initial)
+    stayed = np.full(log_durations.shape, -np.inf)
+    for t, log_likelihood in enumerate(log_emission):
+        moved = np.logaddexp(entered[:, None] + log_durations, stayed)
+        reachable = np.isfinite(moved).any(axis=1)
+        top = float(log_likelihood.max(where=reachable, initial=-np.inf))
+        if not np.isfinite(top):
+            raise _impossible(t)
+        joint = moved + (log_likelihood - top)[:, None]
+        scale = float(np.logaddexp.reduce(joint, axis=None))
+        log_states[t] = joint - scale
+        log_scales[t], tops[t] = scale + top, top
+        entered = np.logaddexp.reduce(log_states[t, :, :1] + log_transition, axis=0)
+        stayed = _remaining_less(log_states[t])
+    return _Forward(log_states, log_scales, tops)
+
+
+def _states_of(log_joint: Array) -> Array:
+    """P(state i at t), shape (T, N), of log joint weights, shape (T, N, D)."""
+    joint = np.exp(log_joint - log_joint.max(axis=(1, 2), keepdims=True)).sum(axis=2)
+    return np.asarray(joint / joint.sum(axis=1, keepdims=True))
+
+
+def _remaining_less(log_values: Array) -> Array:
+    """One step of r → r − 1, shape (N, D): none comes to r = D."""
+    nothing = np.full((len(log_values), 1), -np.inf)
+    return np.concatenate([log_values[:, 1:], nothing], axis=1)
+
+
+def _check_emission(model: DurationHmm, log_emission: Array) -> None:
+    count = len(model.initial)
+    if log_emission.ndim != 2 or log_emission.shape[1] != count or len(log_emission) == 0:
+        raise DurationError(
+            f"log_emission has shape {log_emission.shape}: (T, {count}) with one observation or "
+            "more is expected"
+        )
+    wrong = np.isnan(log_emission).any(axis=1)
+    if wrong.any():
+        raise DurationError(
+            f"log_emission is not a number at observation {int(np.argmax(wrong))}: "
+            "leave out what was not measured"
+        )
+
+
+def _impossible(dead: int) -> ImpossibleSequenceError:
+    return ImpossibleSequenceError(
+        f"the sequence is impossible under the model from its observation {dead} on: "
+        "check durations, structural zeros and emission floors",
+        dead,
+    )

@@ -1,0 +1,148 @@
+"""Gesteme HMMs in parallel and a task HMM above them, learned and run (thesis, chapter 4).
+
+Shapes: M gestemes, S task states, T steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hmcs.motion.steps import Step
+from hmcs.recognition.believing import Believer
+from hmcs.recognition.checking import LARGEST, check_within
+from hmcs.recognition.model import Model, axes_of
+from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.registry import Lesson
+from hmcs.recognition.segments import LabeledSteps, labeled_steps
+from hmcs.recognition.task_chain import chain_of
+from hmcs.task import Task
+from hmcs_baselines.classifying import (
+    GestemeClassifier,
+    Gestemes,
+    check_gestemes,
+    learn_gestemes,
+)
+from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
+from hmcs_baselines.observing import ObservationSettings, Observed
+from hmcs_baselines.restarting import Classification, CusumSettings, Restart
+from hmcs_baselines.task_level import (
+    TaskHmm,
+    TaskLevel,
+    TaskLevelSettings,
+    Told,
+    check_task_hmm,
+    gesteme_shares,
+    learn_task_level,
+)
+
+Array = NDArray[np.float64]
+
+Evidence = Literal["winner", "soft"]
+
+
+class TwoLevelSettings(NamedTuple):
+    """How the two levels are learned, and how they work together."""
+
+    observations: Observed
+    """What the gesteme HMMs observe."""
+    observing: ObservationSettings
+    """Numbers of symbols, and the windows."""
+    gestemes: GestemeHmmSettings
+    """How gesteme HMMs are learned."""
+    restart: Restart
+    """When gesteme HMMs begin anew."""
+    cusum: CusumSettings
+    """The test, where restarts are found by it."""
+    evidence: Evidence
+    """What the task HMM is shown: the most probable gesteme, or all with their probabilities."""
+    task: TaskLevelSettings
+    """How the task HMM is learned."""
+
+
+class TwoLevels(NamedTuple):
+    """What gesteme HMMs and the task HMM above them know."""
+
+    gestemes: Gestemes
+    task: TaskHmm
+    restart: Restart
+    cusum: CusumSettings
+    evidence: Evidence
+
+
+def learn_two_levels(lesson: Lesson, settings: TwoLevelSettings) -> TwoLevels:
+    """Return what is learned: first the gestemes, then the task from what they say.
+
+    The task HMM is trained on what the gesteme HMMs pass up of whole demonstrations, restarted as
+    they will be, so that it expects their mistakes; where restarts are given, at the labels.
+    """
+    task = lesson.task
+    gestemes = learn_gestemes(
+        lesson,
+        settings.observations,
+        settings.observing,
+        settings.gestemes,
+        complete=settings.restart == "network",
+    )
+    told = []
+    for demonstration in lesson.demonstrations:
+        labeled = labeled_steps(task, demonstration)
+        classifier = GestemeClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
+        passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
+        told.append(Told(np.array(passed), labeled.states))
+    lesson.progress("task HMM on what the gesteme HMMs say of the demonstrations")
+    task_hmm = learn_task_level(chain_of(task), told, settings.task)
+    return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
+
+
+def passed_up(classification: Classification, evidence: Evidence) -> Array:
+    """Return the distribution over gestemes that the task HMM is shown, shape (M,)."""
+    gestemes = classification.gestemes
+    return gestemes if evidence == "soft" else np.eye(len(gestemes))[gestemes.argmax()]
+
+
+def check_two_levels(knowledge: TwoLevels, task: Task) -> None:
+    """Raise ValueError where the arrays do not fit together, or not the task."""
+    check_gestemes(knowledge.gestemes, task)
+    check_within("drift_nats", knowledge.cusum.drift_nats, 0.0, LARGEST)
+    check_within("threshold_nats", knowledge.cusum.threshold_nats, 0.0, LARGEST)
+    check_task_hmm(knowledge.task, len(task.states), len(task.gestemes))
+
+
+class TwoLevelRecognizer:
+    """Both levels in one object."""
+
+    def __init__(self, model: Model, *, anywhere: bool) -> None:
+        """Begin as the task does or, with `anywhere`, in any of its states."""
+        knowledge: TwoLevels = model.knowledge
+        self._classifier = GestemeClassifier(
+            knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum
+        )
+        self._task = TaskLevel(knowledge.task, anywhere=anywhere)
+        self._evidence = knowledge.evidence
+        shares = gesteme_shares(chain_of(model.task), len(model.task.gestemes))
+        self._outside = np.where(shares > 0, 0.0, -1.0)
+        self._believer = Believer()
+
+    def step(self, step: Step) -> Recognition:
+        """Take the next step; steps come in order, without gaps."""
+        classification = self._classifier.step(step)
+        states, log_likelihood = self._task.step(passed_up(classification, self._evidence))
+        return self._believer.recognition(
+            step.index,
+            states,
+            self._outside + classification.gestemes,
+            log_likelihood,
+            classification.start,
+        )
+
+
+def _marked(labeled: LabeledSteps) -> Iterator[Step]:
+    """The steps, the pedal down where the label is another."""
+    before = None
+    for step, state, gesteme in zip(labeled.steps, labeled.states, labeled.gestemes, strict=True):
+        yield step._replace(mark=(state, gesteme) != before)
+        before = (state, gesteme)

@@ -1,0 +1,1 @@
+"""States found in demonstrations that carry no labels."""

@@ -1,0 +1,1 @@
+"""The layered segment filter, the default recognizer: restart is inferred, not assumed."""

@@ -1,0 +1,243 @@
+"""The segment filter against enumeration of every segmentation of short sequences."""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmcs.recognition.recognizer import StepEvidence
+from hmcs.recognition.segment_filter.filter import FilterSettings, SegmentFilter, TaskChain
+
+SETTINGS = FilterSettings(
+    any_state=0.05, again=0.3, unknown_after=0.02, abandon=0.01, recover=0.1, drop_below=0.0
+)
+UNKNOWN = "unknown"
+
+
+def random_chain(rng, states=2, gestemes=2, shared=True):
+    """Two states; with `shared`, one gesteme serves both and one state has two gestemes."""
+    slots = [(0, 0), (0, 1), (1, 1)] if shared else [(q, q % gestemes) for q in range(states)]
+    transition = rng.dirichlet(np.ones(states), size=states)
+    transition[-1] *= 0.7
+    counts = defaultdict(int)
+    for state, _ in slots:
+        counts[state] += 1
+    return TaskChain(
+        rng.dirichlet(np.ones(states)),
+        transition,
+        np.array([s for s, _ in slots], dtype=np.int32),
+        np.array([g for _, g in slots], dtype=np.int32),
+        np.array([1.0 / counts[s] for s, _ in slots]),
+    )
+
+
+def random_evidence(rng, steps, gestemes=2, absent=()):
+    """For each step the exit and log ratio of every (gesteme, start), as a dense array."""
+    exits = rng.uniform(0, 0.6, size=(steps, gestemes, steps))
+    ratios = rng.normal(0, 1.5, size=(steps, gestemes, steps))
+    result = []
+    for t in range(steps):
+        held = [g for g in range(gestemes) if (t, g) not in absent]
+        pairs = [(g, s) for s in range(t + 1) for g in held]
+        result.append(
+            StepEvidence(
+                t,
+                tuple(held),
+                np.array([g for g, _ in pairs], dtype=np.int32),
+                np.array([s for _, s in pairs], dtype=np.int32),
+                np.array([exits[t, g, s] if s < t else 0.0 for g, s in pairs]),
+                np.array([ratios[t, g, s] for g, s in pairs]),
+            )
+        )
+    return result
+
+
+def enumerate_segmentations(chain, evidence):
+    """Probability of each segmentation: a list of segments (slot, start) and unknown steps.
+
+    Written as a generator of whole histories, without any of the filter's recursion: a history is
+    the hypothesis at every step, and its weight the product of what each step costs.
+    """
+    states = len(chain.initial)
+
+    def lookup(t, slot, start):
+        g = int(chain.slot_gesteme[slot])
+        if g not in evidence[t].gestemes:
+            return 0.0, 1.0
+        hit = (evidence[t].pair_gesteme == g) & (evidence[t].pair_start == start)
+        if not hit.any():
+            return 0.0, 0.0
+        return float(evidence[t].exit[hit][0]), float(np.exp(evidence[t].log_ratio[hit][0]))
+
+    def opening(slot, state_probability):
+        return state_probability[chain.slot_state[slot]] * chain.slot_share[slot]
+
+    def extend(t, history, weight):
+        if t == len(evidence):
+            yield history, weight
+            return
+        slots = range(len(chain.slot_state))
+        expected = 1 - SETTINGS.any_state - SETTINGS.unknown_after
+        if t == 0:
+            options = [
+                ((k, 0), opening(k, chain.initial) * (1 - SETTINGS.unknown_after)) for k in slots
+            ]
+            options.append((UNKNOWN, SETTINGS.unknown_after))
+        elif history[-1] == UNKNOWN:
+            anywhere = np.full(states, 1 / states)
+            options = [((k, t), SETTINGS.recover * opening(k, anywhere)) for k in slots]
+            options.append((UNKNOWN, 1 - SETTINGS.recover))
+        else:
+            slot, start = history[-1]
+            leave, _ = lookup(t, slot, start)
+            row = chain.transition[chain.slot_state[slot]]
+            ended = expected * (1 - row.sum())
+            follow = expected * row + (SETTINGS.any_state + SETTINGS.again * ended) / states
+            options = [((k, t), leave * opening(k, follow)) for k in slots]
+            options.append(((slot, start), (1 - leave) * (1 - SETTINGS.abandon)))
+            options.append(
+                (
+                    UNKNOWN,
+                    (1 - leave) * SETTINGS.abandon
+                    + leave * (SETTINGS.unknown_after + (1 - SETTINGS.again) * ended),
+                )
+            )
+        for hypothesis, p in options:
+            ratio = 1.0 if hypothesis == UNKNOWN else lookup(t, *hypothesis)[1]
+            yield from extend(t + 1, [*history, hypothesis], weight * p * ratio)
+
+    yield from extend(0, [], 1.0)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    steps=st.integers(1, 5),
+    shared=st.booleans(),
+    hole=st.booleans(),
+)
+@settings(max_examples=30)
+def test_the_filter_is_exact_over_every_segmentation(seed, steps, shared, hole):
+    rng = np.random.default_rng(seed)
+    chain = random_chain(rng, shared=shared)
+    absent = {(steps - 1, 1)} if hole and steps > 1 else set()
+    evidence = random_evidence(rng, steps, absent=absent)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    log_total = 0.0
+    for t in range(steps):
+        belief = task_filter.step(evidence[t])
+        histories = list(enumerate_segmentations(chain, evidence[: t + 1]))
+        total = sum(weight for _, weight in histories)
+        states = np.zeros(2)
+        unknown = 0.0
+        for history, weight in histories:
+            if history[-1] == UNKNOWN:
+                unknown += weight / total
+            else:
+                states[chain.slot_state[history[-1][0]]] += weight / total
+        np.testing.assert_allclose(belief.states, states, atol=1e-12)
+        assert belief.unknown == pytest.approx(unknown, abs=1e-12)
+        assert belief.log_likelihood == pytest.approx(np.log(total) - log_total, abs=1e-10)
+        log_total = np.log(total)
+
+
+def test_the_likely_segment_start_is_that_of_the_heaviest_hypothesis():
+    rng = np.random.default_rng(5)
+    chain = random_chain(rng, shared=True)
+    evidence = random_evidence(rng, 4)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    for item in evidence:
+        belief = task_filter.step(item)
+    weights = defaultdict(float)
+    for history, weight in enumerate_segmentations(chain, evidence):
+        if history[-1] != UNKNOWN and chain.slot_state[history[-1][0]] == belief.states.argmax():
+            weights[history[-1]] += weight
+    slot, start = max(weights, key=weights.__getitem__)
+    assert belief.segment_start == start
+    assert belief.gesteme == chain.slot_gesteme[slot]
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=20)
+def test_beliefs_are_finite_and_sum_to_one_whatever_the_evidence(seed):
+    rng = np.random.default_rng(seed)
+    chain = random_chain(rng)
+    task_filter = SegmentFilter(chain, FilterSettings())
+    for t in range(30):
+        living = [
+            (g, s) for s in range(max(0, t - 9), t + 1) for g in range(2) if rng.random() < 0.7
+        ]
+        evidence = StepEvidence(
+            t,
+            (0, 1),
+            np.array([g for g, _ in living], dtype=np.int32),
+            np.array([s for _, s in living], dtype=np.int32),
+            rng.choice([0.0, 0.3, 1.0], size=len(living)),
+            rng.choice([-40.0, -1.0, 0.0, 5.0, 40.0], size=len(living)),
+        )
+        belief = task_filter.step(evidence)
+        assert np.isfinite(belief.states).all()
+        assert np.isfinite(belief.log_likelihood)
+        assert belief.states.sum() + belief.unknown == pytest.approx(1.0)
+
+
+def test_a_gesteme_without_a_classifier_is_named_and_costs_nothing():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    none = np.zeros(0, dtype=np.int32)
+    belief = task_filter.step(StepEvidence(0, (), none, none, np.zeros(0), np.zeros(0)))
+    assert belief.missing == (0, 1)
+    assert belief.log_likelihood == pytest.approx(0.0)
+    np.testing.assert_allclose(belief.states, chain.initial * (1 - SETTINGS.unknown_after))
+
+
+def test_dropping_what_is_negligible_changes_the_belief_by_less_than_it_drops():
+    rng = np.random.default_rng(9)
+    chain = random_chain(rng)
+    evidence = random_evidence(rng, 40)
+    exact, pruned = (
+        SegmentFilter(chain, SETTINGS),
+        SegmentFilter(chain, SETTINGS._replace(drop_below=1e-6)),
+    )
+    for item in evidence:
+        full, small = exact.step(item), pruned.step(item)
+        np.testing.assert_allclose(small.states, full.states, atol=1e-3)
+
+
+def pairs(step, given, gestemes=(0, 1)):
+    """Evidence of pairs (gesteme, start): (exit, log ratio)."""
+    return StepEvidence(
+        step,
+        gestemes,
+        np.array([g for g, _ in given], dtype=np.int32),
+        np.array([s for _, s in given], dtype=np.int32),
+        np.array([exits for exits, _ in given.values()]),
+        np.array([ratio for _, ratio in given.values()]),
+    )
+
+
+def test_a_missing_gesteme_costs_nothing_however_long_ago_its_segment_began():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    for t in range(6):
+        task_filter.step(pairs(t, {(0, 0): (0.0, 4.0 if t else 2.0), (1, 0): (0.0, -9.0)}))
+    # Nothing is heard of gesteme 0, and what is heard of the other began just now.
+    belief = task_filter.step(pairs(6, {(1, 6): (0.0, 0.0)}, gestemes=(1,)))
+    assert belief.missing == (0,)
+    assert belief.states[0] > 0.9
+    assert belief.segment_start == 0
+
+
+def test_what_is_dropped_does_not_come_back():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    strict = SETTINGS._replace(drop_below=1e-3, any_state=0.0, again=0.0, recover=0.0)
+    believed = {}
+    for name, dropping in (("dropped", strict), ("kept", strict._replace(drop_below=0.0))):
+        task_filter = SegmentFilter(chain, dropping)
+        task_filter.step(pairs(0, {(0, 0): (0.0, 12.0), (1, 0): (0.0, 0.0)}))
+        # What was all but impossible would be nearly certain now.
+        belief = task_filter.step(pairs(1, {(0, 0): (0.0, 0.0), (1, 0): (0.0, 40.0)}))
+        believed[name] = belief.states[1]
+    assert believed["kept"] > 0.99
+    assert believed["dropped"] == 0.0
