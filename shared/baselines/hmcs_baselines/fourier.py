@@ -9,13 +9,12 @@ from hmcs.recognition.recognizer import Recognizer
 from hmcs.recognition.registry import Kind, Lesson
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
 from hmcs_baselines.observing import ObservationSettings
-from hmcs_baselines.restarting import CusumSettings
 from hmcs_baselines.task_level import TaskLevelSettings
 from hmcs_baselines.two_levels import (
     Evidence,
+    LayeredHmmSettings,
     TwoLevelRecognizer,
     TwoLevels,
-    TwoLevelSettings,
     check_two_levels,
     learn_two_levels,
 )
@@ -35,11 +34,8 @@ class FourierSettings(NamedTuple):
 
 
 def _learn(lesson: Lesson) -> TwoLevels:
-    settings = TwoLevelSettings(
-        observations="fourier",
-        restart="network",
-        cusum=CusumSettings(),
-        **lesson.settings._asdict(),
+    settings = LayeredHmmSettings(
+        observations="fourier", restart="network", **lesson.settings._asdict()
     )
     return learn_two_levels(lesson, settings)
 

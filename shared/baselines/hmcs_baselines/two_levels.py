@@ -44,22 +44,25 @@ Array = NDArray[np.float64]
 Evidence = Literal["winner", "soft"]
 
 
-class TwoLevelSettings(NamedTuple):
-    """How the two levels are learned, and how they work together."""
+class LayeredHmmSettings(NamedTuple):
+    """The choices of the layered HMM."""
 
-    observations: Observed
-    """What the gesteme HMMs observe."""
-    observing: ObservationSettings
+    observations: Observed = "od"
+    """What the gesteme HMMs observe; see there."""
+    observing: ObservationSettings = ObservationSettings()
     """Numbers of symbols, and the windows."""
-    gestemes: GestemeHmmSettings
+    gestemes: GestemeHmmSettings = GestemeHmmSettings()
     """How gesteme HMMs are learned."""
-    restart: Restart
-    """When gesteme HMMs begin anew."""
-    cusum: CusumSettings
+    restart: Restart = "network"
+    """When the gesteme HMMs begin anew: where the pedal says (given: as the thesis evaluates
+    them), by the CUSUM test, all the time in a network as Li and Okamura's, or never. The default
+    asks nothing of the operator."""
+    cusum: CusumSettings = CusumSettings()
     """The test, where restarts are found by it."""
-    evidence: Evidence
-    """What the task HMM is shown: the most probable gesteme, or all with their probabilities."""
-    task: TaskLevelSettings
+    evidence: Evidence = "winner"
+    """What the task HMM is shown: the most probable gesteme, as in the thesis, or all of them with
+    their probabilities (soft), which halves the false switches."""
+    task: TaskLevelSettings = TaskLevelSettings()
     """How the task HMM is learned."""
 
 
@@ -73,7 +76,7 @@ class TwoLevels(NamedTuple):
     evidence: Evidence
 
 
-def learn_two_levels(lesson: Lesson, settings: TwoLevelSettings) -> TwoLevels:
+def learn_two_levels(lesson: Lesson, settings: LayeredHmmSettings) -> TwoLevels:
     """Return what is learned: first the gestemes, then the task from what they say.
 
     The task HMM is trained on what the gesteme HMMs pass up of whole demonstrations, restarted as

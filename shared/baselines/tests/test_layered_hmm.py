@@ -15,10 +15,11 @@ from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segments import labeled_steps
 from hmcs.task import Task
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings, GestemeScores
-from hmcs_baselines.layered_hmm import KIND, LayeredHmmSettings
+from hmcs_baselines.layered_hmm import KIND
 from hmcs_baselines.observing import Observed, observations
 from hmcs_baselines.restarting import Restart
 from hmcs_baselines.task_level import TaskLevelSettings
+from hmcs_baselines.two_levels import LayeredHmmSettings
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 GIVEN = LayeredHmmSettings(restart="given")

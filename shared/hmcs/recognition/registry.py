@@ -73,9 +73,10 @@ def kind_named(name: str) -> Kind:
     """Return the kind of that name; raises UserError where none is registered."""
     entry = _registered().get(name)
     if entry is None:
+        baselines = "" if len(_registered()) > 1 else "; install hmcs-baselines for others"
         raise UserError(
             f"unknown recognizer {name!r}: choose one of {', '.join(sorted(_registered()))} "
-            "(`hmcs recognizers` says what each is)"
+            f"(`hmcs recognizers` says what each is){baselines}"
         )
     kind: Kind = entry.load()
     return kind

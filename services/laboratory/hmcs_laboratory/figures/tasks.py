@@ -18,10 +18,9 @@ from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.scoring import Scores, pooled, score
 from hmcs_baselines.classifying import GestemeClassifier
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
-from hmcs_baselines.layered_hmm import LayeredHmmSettings
 from hmcs_baselines.observing import ObservationSettings
 from hmcs_baselines.task_level import TaskLevelSettings
-from hmcs_baselines.two_levels import TwoLevels
+from hmcs_baselines.two_levels import LayeredHmmSettings, TwoLevels
 from hmcs_laboratory.data.hands import Count, Share
 from hmcs_laboratory.data.synthetic_tasks import five_states
 from hmcs_laboratory.data.tasks import Performance, TaskSet
