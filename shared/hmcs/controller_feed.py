@@ -13,8 +13,8 @@ from typing import Literal
 from hmcs.bus.counters import Sequences
 from hmcs.bus.messages import Belief, Motion, Origin, RobotState, Source, Step
 from hmcs.driving import Device, FollowingRobot, heard_device, heard_robot
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Fixture
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Fixture
 from hmcs.translation import sample_of, segment_belief_of
 
 Verdict = Literal["taken", "second", "old", "early", "other_clock"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hmcs.bus import messages
-from hmcs.fixtures.exchanged import Guides, OperatorSample
-from hmcs.fixtures.rules import rules_of
-from hmcs.fixtures.tool_shape import tool_shape_of
-from hmcs.fixtures.trust import SegmentBelief
-from hmcs.fixtures.workspace import regions_of
+from hmcs.fixtures.compliance.trust import SegmentBelief
+from hmcs.fixtures.controller.interface import Guides, OperatorSample
+from hmcs.fixtures.controller.rules import rules_of
+from hmcs.fixtures.regions.tool_shape import tool_shape_of
+from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition, StepEvidence

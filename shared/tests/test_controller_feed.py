@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from hmcs.bus.messages import Belief, Motion, Origin, RobotState, Source, Step
 from hmcs.controller_feed import EARLY_WITHIN, ControllerFeed
 from hmcs.driving import TAKEOVER_S
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Fixture, Guides
-from hmcs.fixtures.rules import Rules, Safeguards
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Fixture, Guides
+from hmcs.fixtures.controller.rules import Rules, Safeguards
 from hmcs.motion.paths import Path
 
 PATH = Path(np.array([[0.0, 0, 0], [1.0, 0, 0]]))

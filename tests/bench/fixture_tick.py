@@ -12,12 +12,12 @@ import trimesh
 from numpy.typing import NDArray
 
 from bench.figures import Figure
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Guides, OperatorSample
-from hmcs.fixtures.meshes import Mesh
-from hmcs.fixtures.regions import Region
-from hmcs.fixtures.rules import Safeguards, rules_of
-from hmcs.fixtures.trust import SegmentBelief
+from hmcs.fixtures.compliance.trust import SegmentBelief
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Guides, OperatorSample
+from hmcs.fixtures.controller.rules import Safeguards, rules_of
+from hmcs.fixtures.regions.forbidden import Region
+from hmcs.fixtures.regions.meshes import Mesh
 from hmcs.motion.paths import Path
 from hmcs.task import load_task
 

@@ -21,7 +21,7 @@ from bench.sockets import Frame, accept, connect, frames, listen, send
 from hmcs.bus.examples import ENVELOPE
 from hmcs.bus.messages import Belief, Envelope, Evidence, Motion, Step
 from hmcs.bus.wire import decode, encode
-from hmcs.fixtures.controller import Controller, Safeguards
+from hmcs.fixtures.controller.controller import Controller, Safeguards
 from hmcs.motion.demonstrations import read_csv
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.segment_filter.recognizer import TaskRecognizer, bank_of

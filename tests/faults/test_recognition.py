@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hmcs.fixtures.compliance import FREE_FACTOR
+from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model

@@ -12,7 +12,7 @@ import numpy as np
 from hmcs.bus.keys import Keys
 from hmcs.bus.messages import Envelope, Message, Motion, Origin, RobotState, Source, Step
 from hmcs.bus.wire import encode, schema_of
-from hmcs.fixtures.controller import Controller
+from hmcs.fixtures.controller.controller import Controller
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import DeadZone
 from hmcs.recognition.model import Model

@@ -19,9 +19,9 @@ from hmcs.bus.config import BusSettings, client_config
 from hmcs.bus.messages import Command, Envelope, RobotState, Source
 from hmcs.bus.session import Received
 from hmcs.bus.wire import encode
-from hmcs.fixtures.regions import clearance_m
-from hmcs.fixtures.tool_shape import PlacedTool, tool_shape_of
-from hmcs.fixtures.workspace import regions_of
+from hmcs.fixtures.regions.forbidden import clearance_m
+from hmcs.fixtures.regions.tool_shape import PlacedTool, tool_shape_of
+from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.motion.demonstrations import Demonstration, write_csv
 from hmcs.recognition.model_file import save_model
 from hmcs.task import Task, load_task

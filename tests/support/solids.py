@@ -9,9 +9,9 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from hmcs.fixtures.closest import nearest_pairs, normals_of
-from hmcs.fixtures.meshes import Mesh
-from hmcs.fixtures.tool_shape import PlacedTool, ToolShape
+from hmcs.fixtures.regions.closest import nearest_pairs, normals_of
+from hmcs.fixtures.regions.meshes import Mesh
+from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape
 from hmcs.motion.quaternions import unit_quaternion
 
 Array = NDArray[np.float64]

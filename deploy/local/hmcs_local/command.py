@@ -664,7 +664,7 @@ def check(
 
     Demonstrations are judged as by `hmcs train`: what it would refuse ends with exit code 2.
     """
-    from hmcs.fixtures.workspace import check_workspace
+    from hmcs.fixtures.regions.workspace import check_workspace
     from hmcs.task import load_task
     from hmcs_trainer.training import checked
 

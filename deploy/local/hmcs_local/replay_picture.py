@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from hmcs.fixtures.compliance import FREE_FACTOR
+from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.recordings.guiding import Guided
 from hmcs.recordings.replaying import Replay
 from hmcs.recordings.stretches import Stretch

@@ -23,7 +23,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
 from hmcs.bus.verbs import HEALTH, LOOKS
-from hmcs.fixtures.rules import rules_of
+from hmcs.fixtures.controller.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped

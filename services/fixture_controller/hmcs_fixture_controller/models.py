@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hmcs.bus.service import UserError
-from hmcs.fixtures.exchanged import Guides
+from hmcs.fixtures.controller.interface import Guides
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files

@@ -36,8 +36,8 @@ from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus, Publisher, Received
 from hmcs.bus.verbs import ACTIVATE, LAST_STEPS, LOAD_MODEL
 from hmcs.controller_feed import ControllerFeed
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Fixture, Guides
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Fixture, Guides
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from hmcs.bus.service import ServiceSettings
-from hmcs.fixtures.rules import Safeguards
+from hmcs.fixtures.controller.rules import Safeguards
 
 Milliseconds = Annotated[float, Field(gt=0, le=1000)]
 

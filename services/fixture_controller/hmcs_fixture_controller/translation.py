@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hmcs.bus.messages import Command, FixtureState
-from hmcs.fixtures.exchanged import Fixture
+from hmcs.fixtures.controller.interface import Fixture
 
 
 def command_of(fixture: Fixture, valid_for_ms: float) -> Command:

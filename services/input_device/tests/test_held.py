@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmcs.bus.messages import Handle
-from hmcs.fixtures.engagement import Engagement
+from hmcs.fixtures.controller.engagement import Engagement
 from hmcs_input_device.held import FASTEST_M_S, JUMP_M, HeldHandle
 from hmcs_input_device.press_gate import HANG_S, SETTLE_S, SILENT_S
 from hmcs_input_device.sources import FARTHEST_M, DeviceSample

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.fixtures.rules import Safeguards
+from hmcs.fixtures.controller.rules import Safeguards
 from hmcs_input_device.press_gate import HANG_S, SETTLE_S, PressGate
 
 PERIOD_S = 0.01

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import pybullet
 
-from hmcs.fixtures.closest import cross
+from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
 from hmcs_robot.driver import Array, JointLimits, Pose
 from hmcs_robot.robots import RobotModel

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from hmcs.fixtures.mesh_files import read_placed_mesh
+from hmcs.fixtures.regions.mesh_files import read_placed_mesh
 from hmcs.motion import quaternions
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.covering import CoveringBox, covering

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.fixtures.closest import cross
-from hmcs.fixtures.regions import NOTHING, Candidates
+from hmcs.fixtures.regions.closest import cross
+from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Array, Pose
 from hmcs_robot.limits import (

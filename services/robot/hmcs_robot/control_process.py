@@ -17,8 +17,8 @@ import sys
 import time
 
 from hmcs.errors import UserError
-from hmcs.fixtures.tool_shape import tool_shape_of
-from hmcs.fixtures.workspace import regions_of
+from hmcs.fixtures.regions.tool_shape import tool_shape_of
+from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.task import Task, load_task
 from hmcs_robot.channel import Channel, Closed, pack_snapshot, requests
 from hmcs_robot.control_loop import ControlLoop, Rules

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.fixtures.clusters import principal_boxes
-from hmcs.fixtures.surfaces import area_vectors
+from hmcs.fixtures.regions.clusters import principal_boxes
+from hmcs.fixtures.regions.surfaces import area_vectors
 from hmcs_robot.driver import Array
 
 LEAST_HALF_M = 1e-4

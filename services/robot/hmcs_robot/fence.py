@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hmcs.fixtures.regions import NOTHING, Candidates, Region, clearance_m, nearby
-from hmcs.fixtures.tool_shape import PlacedTool, ToolShape
+from hmcs.fixtures.regions.forbidden import NOTHING, Candidates, Region, clearance_m, nearby
+from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape
 from hmcs_robot.driver import Pose
 
 

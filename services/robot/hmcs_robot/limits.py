@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.fixtures.closest import cross
-from hmcs.fixtures.keep_out import KeepOut
-from hmcs.fixtures.regions import NOTHING, Candidates
+from hmcs.fixtures.regions.closest import cross
+from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
+from hmcs.fixtures.regions.keep_out import KeepOut
 from hmcs_robot.driver import ArmState, Array, JointLimits
 
 _NOTHING = 1e-6

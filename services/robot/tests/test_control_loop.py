@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hmcs.fixtures.regions import Plane, Region, sphere
-from hmcs.fixtures.tool_shape import ToolShape
+from hmcs.fixtures.regions.forbidden import Plane, Region, sphere
+from hmcs.fixtures.regions.tool_shape import ToolShape
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired
 from hmcs_robot.control import Tuning
 from hmcs_robot.control_loop import ControlLoop, Rules

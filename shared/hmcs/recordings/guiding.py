@@ -22,9 +22,9 @@ from hmcs.bus.messages import (
     Step,
 )
 from hmcs.controller_feed import ControllerFeed
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Fixture
-from hmcs.fixtures.rules import Safeguards
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Fixture
+from hmcs.fixtures.controller.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
 from hmcs.recordings.replaying import Replay, recognizer_named, settings_in
 from hmcs.recordings.ticks import Did, Tick, Ticks

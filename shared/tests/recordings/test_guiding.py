@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from hmcs.bus.messages import FixtureState, Motion, RobotState, Step
-from hmcs.fixtures.compliance import FREE_FACTOR
-from hmcs.fixtures.rules import Safeguards
+from hmcs.fixtures.compliance.factor import FREE_FACTOR
+from hmcs.fixtures.controller.rules import Safeguards
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recordings.comparing import compared, fixtures_compared, rows_of

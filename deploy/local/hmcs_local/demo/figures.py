@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from hmcs.fixtures.compliance import FREE_FACTOR
+from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.recognition.scoring import NONE
 from hmcs_local.demo.measure import Measured
 from hmcs_local.demo.summary import Summary

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.errors import UserError
-from hmcs.fixtures.rules import rules_of
+from hmcs.fixtures.controller.rules import rules_of
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
 from hmcs.shown import plain

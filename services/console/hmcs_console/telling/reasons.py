@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.bus.messages import Belief, Evidence, FixtureState
-from hmcs.fixtures.guidance import TANGENT_REACH_M
+from hmcs.fixtures.guides.guidance import TANGENT_REACH_M
 from hmcs.motion.paths import Path
 from hmcs.task import Task
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hmcs.fixtures.rules import Rules, rules_of
-from hmcs.fixtures.volumes import Volume
+from hmcs.fixtures.controller.rules import Rules, rules_of
+from hmcs.fixtures.guides.volumes import Volume
 from hmcs.shown import Markdown
 from hmcs.task import Task
 

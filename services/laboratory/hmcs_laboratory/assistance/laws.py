@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from hmcs.fixtures.rules import Rules, rules_of
+from hmcs.fixtures.controller.rules import Rules, rules_of
 from hmcs.recognition.registry import DEFAULT
 from hmcs.task import FixtureSetup, Task
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.fixtures.controller import Controller
-from hmcs.fixtures.exchanged import Fixture, Guides, OperatorSample
-from hmcs.fixtures.rules import Rules, Safeguards
-from hmcs.fixtures.trust import SegmentBelief
-from hmcs.fixtures.workspace import regions_of
+from hmcs.fixtures.compliance.trust import SegmentBelief
+from hmcs.fixtures.controller.controller import Controller
+from hmcs.fixtures.controller.interface import Fixture, Guides, OperatorSample
+from hmcs.fixtures.controller.rules import Rules, Safeguards
+from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.leading import leading_hand

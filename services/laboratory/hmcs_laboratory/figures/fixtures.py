@@ -11,14 +11,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
-from hmcs.fixtures.compliance import FREE_FACTOR, Line, crossing, optimal_compliance
-from hmcs.fixtures.cues import stiffness_kept
-from hmcs.fixtures.keep_out import KeepOut
+from hmcs.fixtures.compliance.cues import stiffness_kept
+from hmcs.fixtures.compliance.factor import FREE_FACTOR, Line, crossing, optimal_compliance
+from hmcs.fixtures.guides.pull import beside, leaning
+from hmcs.fixtures.guides.volumes import Knot, Volume
 from hmcs.fixtures.law import Gains, full_speed_gains
 from hmcs.fixtures.parts import PreferredSubspace
-from hmcs.fixtures.pull import beside, leaning
-from hmcs.fixtures.regions import Box, Region, nearby, sphere
-from hmcs.fixtures.volumes import Knot, Volume
+from hmcs.fixtures.regions.forbidden import Box, Region, nearby, sphere
+from hmcs.fixtures.regions.keep_out import KeepOut
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.paths import Path
 from hmcs.task.fixture_parts import CueName, ScalingName
