@@ -17,7 +17,7 @@ from typing import Any, Self
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.rights import OPERATOR, roles
-from hmcs.bus.session import Bus, BusSettings
+from hmcs.bus.session import Bus, BusSettings, RequestRefusedError
 from hmcs.bus.verbs import HEALTH
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import with_free_port
@@ -193,15 +193,16 @@ class Stack:
         """Ask a process how it is; None where it does not answer in time."""
         deadline_s = time.monotonic() + within_s
         while (left_s := deadline_s - time.monotonic()) > 0:
-            answers = HEALTH.ask(
-                self._buses[0],
-                Ask(),
-                service=process.service,
-                instance=process.instance,
-                timeout_s=left_s,
-            )
-            if answers:
-                return answers[0].body
+            with contextlib.suppress(RequestRefusedError):
+                answers = HEALTH.ask(
+                    self._buses[0],
+                    Ask(),
+                    service=process.service,
+                    instance=process.instance,
+                    timeout_s=left_s,
+                )
+                if answers:
+                    return answers[0].body
             # On a machine that stalls this process loses its own link to the router for a moment.
             self.elapse(ASK_AGAIN_S)
         return None

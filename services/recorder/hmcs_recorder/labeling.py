@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from hmcs.bus.messages import Done, Outline, OutlineQuestion, SetLabels
 from hmcs.bus.session import RequestRefusedError
 from hmcs.recordings.outlining import outlined, recording_named, recordings_in, set_labels
@@ -17,21 +19,29 @@ def outline_of(settings: RecorderSettings, asked: OutlineQuestion) -> Outline:
     """Return the outline of a recording, as much as there is of one that is being written.
 
     Raises RecordingError where there is none or it cannot be read, RequestRefusedError where it is
-    too large.
+    too large, or holds what no message can say.
     """
     path = recording_named(settings.folder, asked.recording)
     outline = outlined(_read(settings, path))
-    return Outline(
-        recordings=tuple(file.name for file in recordings_in(settings.folder)),
-        recording=path.name,
-        path=str(path.resolve()),
-        duration_s=outline.duration_s,
-        time_s=outline.time_s,
-        position=outline.positions,
-        begin_s=outline.begin_s,
-        end_s=outline.end_s,
-        states=outline.states,
-    )
+    try:
+        return Outline(
+            recordings=tuple(file.name for file in recordings_in(settings.folder)),
+            recording=path.name,
+            path=str(path.resolve()),
+            duration_s=outline.duration_s,
+            time_s=outline.time_s,
+            position=outline.positions,
+            begin_s=outline.begin_s,
+            end_s=outline.end_s,
+            states=outline.states,
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise RequestRefusedError(
+            f"{path.name} cannot be shown, its {where} is no hand's: {first['msg']}; record it "
+            f"again, or look at it by `hmcs inspect {path}`"
+        ) from None
 
 
 def labels_set(settings: RecorderSettings, asked: SetLabels) -> Done:

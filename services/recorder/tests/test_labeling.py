@@ -18,7 +18,7 @@ from hmcs_recorder import labeling
 from hmcs_recorder.service import Recorder
 from hmcs_recorder.settings import RecorderSettings
 from support.hand import Hand
-from support.recordings import Maker, hand_of
+from support.recordings import KEYS, Maker, hand_of
 from support.stack import Stack
 
 
@@ -130,3 +130,17 @@ def test_what_is_being_recorded_is_outlined_and_goes_on_being_recorded(
     assert outline.recording == "now.mcap"
     assert len(outline.time_s) >= 20
     assert received[Motion.SCHEMA] == 40
+
+
+def test_a_motion_that_no_answer_can_hold_is_refused_with_what_is_wrong(tmp_path: Path) -> None:
+    # Every sample is within what a message may say; the way of the engaged hand leads out of it.
+    far = np.array([9e8, 0.0, 0.0])
+    samples = [
+        Motion(position=side * far, velocity=np.zeros(3), dead_man=dead_man)
+        for _ in range(20)
+        for side, dead_man in ((-1.0, False), (-1.0, True), (1.0, True))
+    ]
+    Maker(tmp_path).write([(KEYS.motion, sample) for sample in samples])
+    settings = RecorderSettings(folder=tmp_path)
+    with pytest.raises(RequestRefusedError, match=r"take\.mcap cannot be shown, its position .*1e"):
+        labeling.outline_of(settings, OutlineQuestion())

@@ -20,7 +20,8 @@ from hmcs.bus.questions import RequestRefusedError
 T = TypeVar("T")
 
 QUESTIONS_BOUND = 64
-"""Questions that may wait for their answer; more are refused at once."""
+"""Questions that may wait for the same threads; more are refused at once. Those for other threads
+are not: who fills the place of slow answers leaves that of the quick ones, health among them."""
 LOOP_WITHIN_S = 2.0
 """A loop that has not come round for so long counts as hung."""
 _THREADS = 4
@@ -39,7 +40,8 @@ class Answering:
         self._mailbox = mailbox
         self._stopping = stopping
         self._threads = ThreadPoolExecutor(_THREADS, thread_name_prefix="answers")
-        self._room = threading.BoundedSemaphore(QUESTIONS_BOUND)
+        self._rooms: dict[Executor, threading.BoundedSemaphore] = {}
+        self._rooms_lock = threading.Lock()
         self._loop_thread: int | None = None
         self._closed = False
 
@@ -53,15 +55,18 @@ class Answering:
         Returns False, and does nothing, where too much waits already. What it raises leaves the
         loop's `pump`.
         """
-        if not self._room.acquire(blocking=False):
+        threads = aside or self._threads
+        with self._rooms_lock:
+            room = self._rooms.setdefault(threads, threading.BoundedSemaphore(QUESTIONS_BOUND))
+        if not room.acquire(blocking=False):
             return False
         try:
-            done = (aside or self._threads).submit(work)
+            done = threads.submit(work)
         except RuntimeError:
             # The process is ending and takes no more work.
-            self._room.release()
+            room.release()
             return False
-        done.add_done_callback(self._finished)
+        done.add_done_callback(lambda done: self._finished(done, room))
         return True
 
     def in_loop(self, work: Callable[[], T]) -> T:
@@ -101,8 +106,8 @@ class Answering:
         self._closed = True
         self._threads.shutdown(wait=False, cancel_futures=True)
 
-    def _finished(self, done: Future[None]) -> None:
-        self._room.release()
+    def _finished(self, done: Future[None], room: threading.BoundedSemaphore) -> None:
+        room.release()
         try:
             error = done.exception()
         except CancelledError:
