@@ -44,7 +44,7 @@ def run(*command: str | Path, **environment: str) -> str:
 
 def sources() -> list[Path]:
     """Every Python file of the project."""
-    folders = ("shared", "services", "deploy", "tests")
+    folders = ("shared", "services", "deploy", "examples", "tests")
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
-from support.stack import CELL, Stack, clean_environment
+from support.stack import Stack
 
 README = Path(__file__).parents[2] / "README.md"
 
@@ -24,18 +23,7 @@ def start_of_readme(stack: Stack, folder: Path, model_file: Path) -> StackProces
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     script = folder / "my_recognizer.py"
     script.write_text(code, encoding="utf-8")
-    instance = "readme"
-    place = ("--router", stack.endpoint, "--cell", CELL, "--instance", instance)
-    process = StackProcess(
-        "my_recognizer",
-        instance,
-        [sys.executable, str(script), "--model", str(model_file), *place],
-        clean_environment(),
-        folder / "readme.log",
-        stop_grace_s=5.0,
-    )
-    stack.processes.append(process)
-    return process
+    return stack.start_program("my_recognizer", "readme", script, "--model", model_file)
 
 
 def test_the_recognizer_in_the_readme_recognizes_and_can_be_activated(

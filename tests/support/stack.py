@@ -108,6 +108,15 @@ class Stack:
         self.until_ready(process)
         return process
 
+    def start_program(
+        self, service: str, instance: str, file: Path, *flags: object
+    ) -> StackProcess:
+        """Start a program that lives as a service, from its file; returns at once."""
+        place = ("--router", self.endpoint, "--cell", self.cell, "--instance", instance)
+        return self._run(
+            service, instance, [sys.executable, str(file), *map(str, (*place, *flags))]
+        )
+
     def until_ready(self, *processes: StackProcess, within_s: float = DEADLINE_S) -> None:
         """Wait until these are present; fail at once where one has ended instead."""
         wanted = {Member(process.service, process.instance) for process in processes}
@@ -124,10 +133,13 @@ class Stack:
         self.until(lambda: Member(process.service, process.instance) not in self.present)
 
     def _spawn(self, service: str, instance: str, module: str, *flags: object) -> StackProcess:
+        return self._run(service, instance, [sys.executable, "-m", module, *map(str, flags)])
+
+    def _run(self, service: str, instance: str, command: list[str]) -> StackProcess:
         process = StackProcess(
             service,
             instance,
-            [sys.executable, "-m", module, *map(str, flags)],
+            command,
             clean_environment() | self._certificates(service, instance),
             self.folder / f"{len(self.processes)}-{service}-{instance}.log",
             stop_grace_s=DEADLINE_S,
