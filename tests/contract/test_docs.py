@@ -18,8 +18,14 @@ from hmcs.task.parts import State
 from hmcs_local.command import app
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [
+    *sorted(ROOT.glob("*.md")),
+    ROOT / "examples/README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 NAMES = [str(document.relative_to(ROOT)) for document in DOCUMENTS]
+README_BYTES = 8_000
+"""Who wants to know more follows its links."""
 documents = pytest.mark.parametrize("document", DOCUMENTS, ids=NAMES)
 
 
@@ -35,6 +41,10 @@ def commands(document: Path) -> list[list[str]]:
     return [
         [word for word in each if not re.fullmatch(r"[A-Z_]+=\S*", word)] for each in words if each
     ]
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_bytes()) <= README_BYTES
 
 
 def test_the_contract_is_the_one_the_code_speaks() -> None:

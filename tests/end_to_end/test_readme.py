@@ -1,8 +1,10 @@
-"""What the README shows runs as it stands there."""
+"""What README and documents show runs as it stands there."""
 
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +15,45 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
-from support.stack import Stack
+from support.stack import DEADLINE_S, Stack, clean_environment
 
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
+OWN_RECOGNIZER = ROOT / "docs/how-to/own-recognizer.md"
 
 
-def start_of_readme(stack: Stack, folder: Path, model_file: Path) -> StackProcess:
-    """Start the README's recognizer from the file it says to save it in."""
-    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+def program_in(document: Path) -> str:
+    """Return the one program of a document."""
+    text = document.read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    return str(code)
+
+
+def test_the_program_in_the_readme_tells_the_states_one_after_the_other() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", program_in(ROOT / "README.md")],
+        cwd=ROOT,
+        env=clean_environment(),
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert list(dict.fromkeys(done.stdout.split())) == ["reach", "turn", "lift"]
+
+
+def start_of_how_to(stack: Stack, folder: Path, model_file: Path) -> StackProcess:
+    """Start the recognizer of the how-to from the file it says to save it in."""
     script = folder / "my_recognizer.py"
-    script.write_text(code, encoding="utf-8")
-    return stack.start_program("my_recognizer", "readme", script, "--model", model_file)
+    script.write_text(program_in(OWN_RECOGNIZER), encoding="utf-8")
+    return stack.start_program("my_recognizer", "how-to", script, "--model", model_file)
 
 
-def test_the_recognizer_in_the_readme_recognizes_and_can_be_activated(
+def test_the_recognizer_of_the_how_to_recognizes_and_can_be_activated(
     scene: Scene, model_file: Path, model: Model, steps: list[Step], tmp_path: Path
 ) -> None:
     stack = scene.stack
-    mine = start_of_readme(stack, tmp_path, model_file)
+    mine = start_of_how_to(stack, tmp_path, model_file)
     fixture = stack.start("fixture_controller", "f", "--models", model_file)
     stack.until_ready(mine, fixture)
 
