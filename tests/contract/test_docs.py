@@ -24,6 +24,7 @@ DOCUMENTS = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 NAMES = [str(document.relative_to(ROOT)) for document in DOCUMENTS]
+EQUATION = re.compile(r"(?<![\d.])[23]\.\d+(?![\d.])")
 README_BYTES = 8_000
 """Who wants to know more follows its links."""
 documents = pytest.mark.parametrize("document", DOCUMENTS, ids=NAMES)
@@ -109,6 +110,22 @@ def test_every_yaml_block_is_a_task_or_a_part_of_one(document: Path) -> None:
             Task.model_validate(data)
         for state in data.get("states", ()):
             State.model_validate(state)
+
+
+def test_every_equation_that_the_code_cites_stands_on_its_page_with_its_place() -> None:
+    text = (ROOT / "docs/equations.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([0-9.]+)(?:–([0-9.]+))? \| .*? \| `([^`]+)` \|", text, re.MULTILINE)
+    explained = set()
+    for first, last, place in rows:
+        chapter, begin = first.split(".")
+        end = last.split(".")[1] if last else begin
+        explained |= {f"{chapter}.{number}" for number in range(int(begin), int(end) + 1)}
+        cited = set(EQUATION.findall((ROOT / place).read_text(encoding="utf-8")))
+        assert {first, last or first} <= cited, f"{place} does not cite {first}"
+    for file in (*ROOT.glob("shared/**/*.py"), *ROOT.glob("services/**/*.py")):
+        if "tests" not in file.parts and ".venv" not in file.parts:
+            for cited in re.findall(r"\(([23]\.[1-9]\d*)\)", file.read_text(encoding="utf-8")):
+                assert cited in explained, f"{file.relative_to(ROOT)} cites ({cited})"
 
 
 def test_the_device_of_the_how_to_is_a_source() -> None:
