@@ -15,11 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.content import taken_apart
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import ModelFileError, check_model, load_model, save_model
 from hmcs.recognition.registry import kinds, recognizer_of
+from hmcs.recognition.serialization import to_arrays
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 NAMES = [kind.name for kind in kinds()]
@@ -127,7 +127,7 @@ def test_what_is_learned_is_a_model_that_is_read(name: str, tmp_path: Path) -> N
     model = taught(name)
     check_model(model)
     loaded = load_model(save_and_name(model, tmp_path / "m.hmcs"))
-    ours, theirs = taken_apart(model.knowledge), taken_apart(loaded.knowledge)
+    ours, theirs = to_arrays(model.knowledge), to_arrays(loaded.knowledge)
     assert ours.plain == theirs.plain
     assert all((ours.arrays[key] == theirs.arrays[key]).all() for key in ours.arrays)
 

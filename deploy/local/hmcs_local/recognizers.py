@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from hmcs.recognition.registry import Kind, setting_values
+from hmcs.recognition.registry import RecognizerSpec, setting_values
 
 
-def show_kinds(kinds: Sequence[Kind], console: Console) -> None:
+def show_kinds(kinds: Sequence[RecognizerSpec], console: Console) -> None:
     """Print a row for each kind; where nobody looks, a line of tab-separated fields."""
     if not console.is_terminal:
         for kind in kinds:
@@ -22,7 +22,7 @@ def show_kinds(kinds: Sequence[Kind], console: Console) -> None:
     console.print(table)
 
 
-def show_kind(kind: Kind, console: Console) -> None:
+def show_kind(kind: RecognizerSpec, console: Console) -> None:
     """Print a kind with its settings and their defaults, as `--set` takes them."""
     console.print(f"{kind.name}: {kind.summary}", soft_wrap=True, highlight=False)
     console.print(f"source: {kind.source}", soft_wrap=True, highlight=False)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from hmcs.bus.keys import ANY, recognizer_in
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import (
     ActivateRecognizer,
     Belief,
@@ -64,7 +64,7 @@ class FixtureController(Service):
 
     def __init__(self, settings: FixtureControllerSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._controller = Controller(settings.safeguards)
         self._feed = ControllerFeed(self._controller)
         self._recognizers = Recognizers()
@@ -352,7 +352,7 @@ class FixtureController(Service):
     def _refuse(self, message_type: type[Message], reason: str) -> None:
         schema = message_type.SCHEMA
         self.bus.counters.count_refused(schema, reason)
-        self._seldom.warning(schema, f"{schema} refused", reason=reason)
+        self._limited.warning(schema, f"{schema} refused", reason=reason)
 
 
 def _now_s() -> float:

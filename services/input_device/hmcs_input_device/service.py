@@ -7,7 +7,7 @@ import time
 from collections import Counter
 
 from hmcs.bus.keys import ANY
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import (
     Ask,
     Done,
@@ -66,7 +66,7 @@ class InputDevice(Service):
         self._playing = Playing(self._rate_hz, minds_stops=plays(self._source))
         self._zone = DeadZone(self._dead_zone_m)
         self._kept = KeptSteps(settings.steps_kept)
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._present: set[str] = set()
         self._robot = FollowingRobot()
         self._may_play = settings.autoplay
@@ -153,10 +153,10 @@ class InputDevice(Service):
             self.log.info("presses again" if released else "lets go, as the robot stands")
         if refusal := self._guarded.refusal:
             self.bus.counters.count_refused(Motion.SCHEMA, refusal)
-            self._seldom.warning("sample", "sample refused", reason=refusal)
+            self._limited.warning("sample", "sample refused", reason=refusal)
         trouble = self._guarded.trouble
         if trouble and trouble not in (refusal, self._told_trouble):
-            self._seldom.warning("trouble", "the hand rests", reason=trouble)
+            self._limited.warning("trouble", "the hand rests", reason=trouble)
         self._told_trouble = trouble
         return sample
 
@@ -208,7 +208,7 @@ class InputDevice(Service):
         if not self._source.handled(received.received_ns / _NS_PER_S, received.body):
             reason = self._source.refusal
             self.bus.counters.count_refused(Handle.SCHEMA, reason)
-            self._seldom.warning("handle", "handle refused", reason=reason)
+            self._limited.warning("handle", "handle refused", reason=reason)
 
     def _on_fixture_state(self, received: Received[FixtureState]) -> None:
         if self._reaction is not None:

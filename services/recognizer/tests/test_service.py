@@ -45,7 +45,7 @@ class Bench(NamedTuple):
 
 @pytest.fixture(scope="module")
 def taught(tmp_path_factory: pytest.TempPathFactory) -> Taught:
-    path = tmp_path_factory.mktemp("model") / "lesson.hmcs"
+    path = tmp_path_factory.mktemp("model") / "data.hmcs"
     model = learn(lesson_task(), [performed(1), performed(2)], recognizer="task-hmm")
     return Taught(save_model(model, path), path)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from hmcs.bus.counters import Sequences
 from hmcs.bus.keys import check_name
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import (
     Done,
@@ -60,7 +60,7 @@ class Recorder(Service):
 
     def __init__(self, settings: RecorderSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._recording: Recording | None = None
         self._wanted = ""
         self._trouble = ""
@@ -151,7 +151,7 @@ class Recorder(Service):
             # Whatever it is about one message, those that came with it are recorded.
             expected = isinstance(error, ValueError)
             self.bus.counters.count_refused(LOST, str(error))
-            self._seldom.warning(
+            self._limited.warning(
                 "not recorded",
                 "not recorded",
                 exc_info=not expected,
@@ -191,7 +191,7 @@ class Recorder(Service):
         self.bus.counters.received[schema] += 1
         if lost:
             self.bus.counters.lost[schema] += lost
-            self._seldom.warning(f"lost {key}", "messages lost", key=key, lost=lost)
+            self._limited.warning(f"lost {key}", "messages lost", key=key, lost=lost)
 
     def _captured_ns(self, fields: Fields, log_ns: int) -> int | None:
         origin = fields.get("origin")

@@ -11,7 +11,7 @@ import logging
 import threading
 from collections import OrderedDict
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import (
     Ask,
     Command,
@@ -62,7 +62,7 @@ class Robot(Service):
     def __init__(self, settings: RobotSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._room = ControlRoom(settings, log)
         self._lock = threading.Lock()
         self._waiting: Snapshot | None = None
@@ -221,7 +221,7 @@ class Robot(Service):
         if foreign:
             self._refuse("a second writer, while the first one is fresh", foreign)
         if before is not None and snapshot.late_ticks > before.late_ticks:
-            self._seldom.warning("late", "late control ticks", count=snapshot.late_ticks)
+            self._limited.warning("late", "late control ticks", count=snapshot.late_ticks)
 
     def _on_end(self) -> None:
         if not self._ended:
@@ -233,7 +233,7 @@ class Robot(Service):
     def _refuse(self, reason: str, count: int = 1) -> None:
         self._foreign_refusals += count
         self.bus.counters.refused[Command.SCHEMA] += count
-        self._seldom.warning("refused", "command refused", reason=reason)
+        self._limited.warning("refused", "command refused", reason=reason)
 
     # --- what is said -----------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import Belief, Evidence, Origin
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
@@ -40,7 +40,7 @@ class TaskHmm(Service):
         self._clock = ""
         self._timer: Timer | None = None
         self._degraded = 0
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._belief = bus.publisher(Belief, bus.keys.belief(self._model.name, bus.source.instance))
         self._feed = StepFeed(
             bus,
@@ -110,7 +110,7 @@ class TaskHmm(Service):
             if recognition.belief.missing:
                 self._degraded += 1
                 names = self._named(recognition.belief.missing)
-                self._seldom.warning("degraded", "no evidence in time", gestemes=", ".join(names))
+                self._limited.warning("degraded", "no evidence in time", gestemes=", ".join(names))
             step = released.evidence.step
             message = belief_message(self._model, recognition, self._clock)
             self._belief.put(message, self._origins.pop(step, None))
@@ -136,4 +136,4 @@ class TaskHmm(Service):
 
     def _refuse(self, reason: str) -> None:
         self.bus.counters.count_refused(Evidence.SCHEMA, reason)
-        self._seldom.warning("refused", "evidence refused", reason=reason)
+        self._limited.warning("refused", "evidence refused", reason=reason)

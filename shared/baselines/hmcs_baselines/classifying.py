@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import axes_of
-from hmcs.recognition.registry import Lesson
+from hmcs.recognition.registry import TrainingData
 from hmcs.task import Task
 from hmcs_baselines.gesteme_hmms import (
     GestemeHmms,
@@ -46,7 +46,7 @@ class Gestemes(NamedTuple):
 
 
 def learn_gestemes(
-    lesson: Lesson,
+    data: TrainingData,
     observed: Observed,
     observation_settings: ObservationSettings,
     hmm_settings: GestemeHmmSettings,
@@ -54,19 +54,19 @@ def learn_gestemes(
     complete: bool,
 ) -> Gestemes:
     """Return what labeled segments tell of the gestemes; `complete` as `learn_gesteme_hmms`."""
-    axes = axes_of(lesson.task)
+    axes = axes_of(data.task)
     observing = learn_observing(
-        [segment.steps for segment in lesson.segments],
+        [segment.steps for segment in data.segments],
         axes,
         observed,
         observation_settings,
-        lesson.rng,
+        data.rng,
     )
     by_gesteme = [
-        [observations(s.steps, observing, axes) for s in lesson.segments if s.gesteme == g]
-        for g in range(len(lesson.task.gestemes))
+        [observations(s.steps, observing, axes) for s in data.segments if s.gesteme == g]
+        for g in range(len(data.task.gestemes))
     ]
-    lesson.progress(f"gesteme HMMs on {observed} observations")
+    data.progress(f"gesteme HMMs on {observed} observations")
     hmms = learn_gesteme_hmms(by_gesteme, observing.symbols, hmm_settings, complete=complete)
     return Gestemes(observing, hmms)
 

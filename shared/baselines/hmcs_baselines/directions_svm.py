@@ -21,7 +21,7 @@ from hmcs.recognition.checking import (
 from hmcs.recognition.hmm.emissions import floored
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segments import LabeledSteps, labeled_steps
 from hmcs.recognition.task_chain import TaskChain, chain_of
 from hmcs.task import Task
@@ -81,19 +81,19 @@ class DirectionRecognizer:
         return self._filter.step(step.index, np.log(self._shares @ directions))
 
 
-def _learn(lesson: Lesson) -> DirectionTask:
-    settings: DirectionTaskSettings = lesson.settings
-    chain, axes = chain_of(lesson.task), list(axes_of(lesson.task))
-    labeled = [labeled_steps(lesson.task, each) for each in lesson.demonstrations]
+def _learn(data: TrainingData) -> DirectionTask:
+    settings: DirectionTaskSettings = data.settings
+    chain, axes = chain_of(data.task), list(axes_of(data.task))
+    labeled = [labeled_steps(data.task, each) for each in data.demonstrations]
     moved = [np.array([step.displacement[axes] for step in each.steps]) for each in labeled]
     directions = learn_directions(
-        moved, settings.directions, lesson.rng, [each.gestemes for each in labeled]
+        moved, settings.directions, data.rng, [each.gestemes for each in labeled]
     )
-    lesson.progress(f"{len(directions.initial)} directions found")
+    data.progress(f"{len(directions.initial)} directions found")
     believed = [_filtered(directions, own) for own in moved]
     return DirectionTask(
         directions,
-        learn_slot_chain(chain, lesson.segments, settings.any_state),
+        learn_slot_chain(chain, data.segments, settings.any_state),
         direction_shares(chain, labeled, believed, settings.least_share),
     )
 
@@ -136,7 +136,7 @@ def _check(known: DirectionTask, task: Task) -> None:
     check_distributions("shares", known.shares)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="directions-svm",
     summary="nominal motion directions found without labels, told apart step by step, and an HMM",
     source="Aarno 2007, chapter 3",

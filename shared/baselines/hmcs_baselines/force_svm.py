@@ -17,7 +17,7 @@ from hmcs.motion.steps import Step
 from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, check_within
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.sensors import sensor_rows
 from hmcs.recognition.task_chain import chain_of
@@ -129,18 +129,18 @@ def _rows(
     return sensor_rows(steps, ("force", "torque"), ())[:, list(components)]
 
 
-def _learn(lesson: Lesson) -> ForceTask:
-    settings: ForceSettings = lesson.settings
-    chain = chain_of(lesson.task)
+def _learn(data: TrainingData) -> ForceTask:
+    settings: ForceSettings = data.settings
+    chain = chain_of(data.task)
     observed: Literal["wrench", "direction"] = "wrench"
     components = tuple(int(k) for k in np.flatnonzero(settings.components))
-    if any(step.wrench is None for each in lesson.segments for step in each.steps):
-        lesson.progress("not all demonstrations carry a force: directions of motion are used")
-        observed, components = "direction", axes_of(lesson.task)
+    if any(step.wrench is None for each in data.segments for step in each.steps):
+        data.progress("not all demonstrations carry a force: directions of motion are used")
+        observed, components = "direction", axes_of(data.task)
     if not components:
         raise LearningError("no component of the wrench is looked at: switch one on")
-    rows = [_rows(each.steps, observed, components) for each in lesson.segments]
-    categories = np.repeat([s.gesteme for s in lesson.segments], [len(own) for own in rows])
+    rows = [_rows(each.steps, observed, components) for each in data.segments]
+    categories = np.repeat([s.gesteme for s in data.segments], [len(own) for own in rows])
     stacked = np.concatenate(rows)
     scale = stacked.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
@@ -154,10 +154,10 @@ def _learn(lesson: Lesson) -> ForceTask:
         learn_estimator(
             standard,
             categories,
-            class_means(standard, categories, len(lesson.task.gestemes)),
+            class_means(standard, categories, len(data.task.gestemes)),
             settings.estimator,
         ),
-        learn_slot_chain(chain, lesson.segments, settings.any_state),
+        learn_slot_chain(chain, data.segments, settings.any_state),
     )
 
 
@@ -177,7 +177,7 @@ def _check(known: ForceTask, task: Task) -> None:
     check_estimator(known.estimator, len(task.gestemes), count)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="force-svm",
     summary="support vectors on force for each category of sub-task, an HMM of sub-tasks above",
     source="Castellani et al. 2004; thesis 2.3",

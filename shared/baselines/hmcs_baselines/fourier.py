@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
 from hmcs_baselines.observing import ObservationSettings
 from hmcs_baselines.task_level import TaskLevelSettings
@@ -33,18 +33,18 @@ class FourierSettings(NamedTuple):
     """How the task HMM is learned."""
 
 
-def _learn(lesson: Lesson) -> TwoLevels:
+def _learn(data: TrainingData) -> TwoLevels:
     settings = LayeredHmmSettings(
-        observations="fourier", restart="network", **lesson.settings._asdict()
+        observations="fourier", restart="network", **data.settings._asdict()
     )
-    return learn_two_levels(lesson, settings)
+    return learn_two_levels(data, settings)
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return TwoLevelRecognizer(model, anywhere=anywhere)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="fourier",
     summary="discrete gesteme HMMs on a code book of Fourier features, restarted as a network",
     source="Yu, Alqasemi, Dubey & Pernalete 2005, as Aarno 2007, 2.3 and 4.1.1 cites it",

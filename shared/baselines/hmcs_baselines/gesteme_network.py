@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.believing import Believer
+from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.task_chain import chain_of
 from hmcs_baselines.concatenated import (
     Network,
@@ -52,14 +52,14 @@ class GestemeNetwork:
         self._network, self._scores = _network(model, anywhere)
         self._filter = ForwardBank(self._network.initial[None], self._network.transition[None])
         self._cells = (len(model.task.states), len(model.task.gestemes))
-        self._believer = Believer()
+        self._beliefs = BeliefBuilder()
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         gain = self._filter.step(self._scores.log_emission(step)[None])
         cells = np.zeros(self._cells)
         np.add.at(cells, (self._network.task_state, self._network.gesteme), self._filter.states[0])
-        return self._believer.recognition(step.index, cells.sum(axis=1), cells, float(gain[0]))
+        return self._beliefs.recognition(step.index, cells.sum(axis=1), cells, float(gain[0]))
 
 
 def _network(model: Model, anywhere: bool) -> tuple[Network, NetworkScores]:
@@ -67,10 +67,10 @@ def _network(model: Model, anywhere: bool) -> tuple[Network, NetworkScores]:
     return network, NetworkScores(model.knowledge, network, model.axes, model.task.dead_zone_m)
 
 
-def _learn(lesson: Lesson) -> NetworkKnowledge:
-    task = lesson.task
+def _learn(data: TrainingData) -> NetworkKnowledge:
+    task = data.task
     return learn_network(
-        lesson.segments, len(task.gestemes), axes_of(task), task.dead_zone_m, lesson.settings
+        data.segments, len(task.gestemes), axes_of(task), task.dead_zone_m, data.settings
     )
 
 
@@ -78,7 +78,7 @@ def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return GestemeNetwork(model, anywhere=anywhere)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="gesteme-network",
     summary="Gaussian gesteme HMMs joined by the task's network into one, filtered online",
     source="Hundtofte, Hager & Okamura 2002, as Aarno 2007, 2.3 describes it; online is ours",

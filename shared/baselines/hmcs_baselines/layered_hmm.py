@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs_baselines.two_levels import (
     LayeredHmmSettings,
     TwoLevelRecognizer,
@@ -14,15 +14,15 @@ from hmcs_baselines.two_levels import (
 )
 
 
-def _learn(lesson: Lesson) -> TwoLevels:
-    return learn_two_levels(lesson, lesson.settings)
+def _learn(data: TrainingData) -> TwoLevels:
+    return learn_two_levels(data, data.settings)
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return TwoLevelRecognizer(model, anywhere=anywhere)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="lhmm",
     summary="layered HMM: gesteme HMMs on OD, MD or FFT symbols, a task HMM on their winner",
     source="Aarno 2007, chapter 4",

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.believing import Believer
+from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition, Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.task_chain import TaskChain, chain_of
 from hmcs_baselines.classifying import (
     GestemeClassifier,
@@ -48,13 +48,13 @@ class OnlineNetwork:
         self._classifier = GestemeClassifier(
             model.knowledge, model.axes, "network", CusumSettings()
         )
-        self._believer = Believer()
+        self._beliefs = BeliefBuilder()
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         classification = self._classifier.step(step)
         cells = self._state_given_gesteme * classification.gestemes
-        return self._believer.recognition(
+        return self._beliefs.recognition(
             step.index, cells.sum(axis=1), cells, classification.log_likelihood
         )
 
@@ -76,10 +76,10 @@ def state_given_gesteme(chain: TaskChain, gestemes: int) -> Array:
     return np.asarray(joint / joint.sum(axis=0))
 
 
-def _learn(lesson: Lesson) -> Gestemes:
-    settings: OnlineNetworkSettings = lesson.settings
+def _learn(data: TrainingData) -> Gestemes:
+    settings: OnlineNetworkSettings = data.settings
     return learn_gestemes(
-        lesson, settings.observations, settings.observing, settings.gestemes, complete=True
+        data, settings.observations, settings.observing, settings.gestemes, complete=True
     )
 
 
@@ -87,7 +87,7 @@ def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return OnlineNetwork(model, anywhere=anywhere)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="online-network",
     summary="gesteme HMMs that are all always restarted, from the end of any; no task HMM",
     source="Li & Okamura 2003, as Aarno 2007, 2.34–2.35 gives it",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.recognition.believing import Believer
+from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import check_distributions, check_shapes
 from hmcs.recognition.hmm.inference import shortest_path
 from hmcs.recognition.recognizer import Recognition
@@ -93,7 +93,7 @@ class SlotFilter:
         """Begin as the task does or, with `anywhere`, in any state."""
         initial = _anywhere(chain) if anywhere else slots.initial
         self._bank = ForwardBank(initial[None], slots.transition[None])
-        self._believer = Believer()
+        self._beliefs = BeliefBuilder()
         self._where = (chain.slot_state, chain.slot_gesteme)
         self._shape = (len(chain.initial), int(chain.slot_gesteme.max()) + 1)
 
@@ -102,7 +102,7 @@ class SlotFilter:
         log_likelihood = float(self._bank.step(log_emission[None])[0])
         joint = np.zeros(self._shape)
         joint[self._where] = self._bank.states[0]
-        return self._believer.recognition(index, joint.sum(axis=1), joint, log_likelihood)
+        return self._beliefs.recognition(index, joint.sum(axis=1), joint, log_likelihood)
 
 
 def most_probable_states(chain: TaskChain, slots: SlotChain, log_emission: Array) -> Integers:

@@ -22,7 +22,7 @@ from hmcs.recognition.checking import (
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.sensors import (
     SensorReader,
@@ -124,24 +124,24 @@ def slot_log_emission(hmm: GaussianTaskHmm, rows: Array) -> Array:
     return result
 
 
-def _learn(lesson: Lesson) -> GaussianTaskHmm:
-    settings: TaskHmmSettings = lesson.settings
-    chain, axes = chain_of(lesson.task), axes_of(lesson.task)
-    names = sensors_of([each.steps for each in lesson.segments], settings.sensors)
+def _learn(data: TrainingData) -> GaussianTaskHmm:
+    settings: TaskHmmSettings = data.settings
+    chain, axes = chain_of(data.task), axes_of(data.task)
+    names = sensors_of([each.steps for each in data.segments], settings.sensors)
     if not names:
         raise LearningError(
             "the demonstrations have none of the sensors asked for: switch one of "
             f"{', '.join(Sensors._fields)} on"
         )
-    rows = [sensor_rows(each.steps, names, axes) for each in lesson.segments]
+    rows = [sensor_rows(each.steps, names, axes) for each in data.segments]
     floor = np.repeat(
         [getattr(settings.least_spread, name) ** 2 for name in names], dimensions(names, axes)
     )
-    by_slot = slot_rows(chain, lesson.segments, rows)
-    lesson.progress(f"{len(by_slot)} states with {len(floor)} dimensions: {', '.join(names)}")
+    by_slot = slot_rows(chain, data.segments, rows)
+    data.progress(f"{len(by_slot)} states with {len(floor)} dimensions: {', '.join(names)}")
     return GaussianTaskHmm(
         names,
-        learn_slot_chain(chain, lesson.segments, settings.any_state),
+        learn_slot_chain(chain, data.segments, settings.any_state),
         np.array([np.nanmean(own, axis=0) for own in by_slot]),
         np.maximum([np.nanvar(own, axis=0) for own in by_slot], floor),
     )
@@ -163,7 +163,7 @@ def _check(hmm: GaussianTaskHmm, task: Task) -> None:
     check_spreads("variances", hmm.variances)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="task-hmm",
     summary="one HMM state per task state, independent Gaussian sensors, dwell-time transitions",
     source="Hannaford & Lee 1990; thesis 2.3 and (2.33)",

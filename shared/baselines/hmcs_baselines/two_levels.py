@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
-from hmcs.recognition.believing import Believer
+from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import LARGEST, check_within
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition
-from hmcs.recognition.registry import Lesson
+from hmcs.recognition.registry import TrainingData
 from hmcs.recognition.segments import LabeledSteps, labeled_steps
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
@@ -76,27 +76,27 @@ class TwoLevels(NamedTuple):
     evidence: Evidence
 
 
-def learn_two_levels(lesson: Lesson, settings: LayeredHmmSettings) -> TwoLevels:
+def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLevels:
     """Return what is learned: first the gestemes, then the task from what they say.
 
     The task HMM is trained on what the gesteme HMMs pass up of whole demonstrations, restarted as
     they will be, so that it expects their mistakes; where restarts are given, at the labels.
     """
-    task = lesson.task
+    task = data.task
     gestemes = learn_gestemes(
-        lesson,
+        data,
         settings.observations,
         settings.observing,
         settings.gestemes,
         complete=settings.restart == "network",
     )
     told = []
-    for demonstration in lesson.demonstrations:
+    for demonstration in data.demonstrations:
         labeled = labeled_steps(task, demonstration)
         classifier = GestemeClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
         passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
         told.append(Told(np.array(passed), labeled.states))
-    lesson.progress("task HMM on what the gesteme HMMs say of the demonstrations")
+    data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
     task_hmm = learn_task_level(chain_of(task), told, settings.task)
     return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
 
@@ -128,13 +128,13 @@ class TwoLevelRecognizer:
         self._evidence = knowledge.evidence
         shares = gesteme_shares(chain_of(model.task), len(model.task.gestemes))
         self._outside = np.where(shares > 0, 0.0, -1.0)
-        self._believer = Believer()
+        self._beliefs = BeliefBuilder()
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         classification = self._classifier.step(step)
         states, log_likelihood = self._task.step(passed_up(classification, self._evidence))
-        return self._believer.recognition(
+        return self._beliefs.recognition(
             step.index,
             states,
             self._outside + classification.gestemes,

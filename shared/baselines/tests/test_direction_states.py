@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hmcs.motion.operators import Operator, follow, joined
-from hmcs.recognition.content import put_together, taken_apart
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.topologies import fully_connected
+from hmcs.recognition.serialization import from_arrays, to_arrays
 from hmcs_baselines.direction_states import (
     DirectionFilter,
     DirectionStates,
@@ -186,7 +186,7 @@ def test_labels_that_are_missing_are_asked_for() -> None:
 @pytest.mark.parametrize("chosen", EVERY)
 def test_knowledge_is_plain_data(chosen: DirectionStateSettings) -> None:
     known, (moved, _) = learned(chosen), performed(52)
-    again = put_together(DirectionStates, taken_apart(known))
+    again = from_arrays(DirectionStates, to_arrays(known))
     assert type(again.estimator) is type(known.estimator)
     check_direction_states(again, 3)
     np.testing.assert_array_equal(filtered(again, moved), filtered(known, moved))

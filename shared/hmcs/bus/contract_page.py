@@ -33,7 +33,7 @@ from hmcs.bus.messages import (
     StopRequest,
     TrainingProgress,
 )
-from hmcs.bus.qos import STANCES
+from hmcs.bus.qos import QOS_PROFILES
 from hmcs.bus.rights import PEOPLE, is_within, rights_of, roles
 from hmcs.bus.verbs import VERBS
 from hmcs.bus.wire import schema_of
@@ -85,11 +85,11 @@ def _keys() -> Iterator[str]:
     yield "| key | message | at most | priority | a slow receiver gets | why |"
     yield "|---|---|---|---|---|---|"
     for message, key in published_keys(keys).items():
-        stance = STANCES[message]
-        delivery = "the newest" if stance.delivery == "newest_wins" else "every one, in order"
+        profile = QOS_PROFILES[message]
+        delivery = "the newest" if profile.delivery == "keep_last" else "every one, in order"
         yield (
-            f"| `{_named(key)}` | {_linked(message)} | {_size(message)} | {stance.priority} | "
-            f"{delivery} | {stance.reason} |"
+            f"| `{_named(key)}` | {_linked(message)} | {_size(message)} | {profile.priority} | "
+            f"{delivery} | {profile.reason} |"
         )
     yield ""
     yield f"- `{_named(keys.presence('SERVICE', 'INSTANCE'))}`: liveliness token of a process."

@@ -73,7 +73,7 @@ class Readable(logging.Formatter):
         return "\n".join(told)
 
 
-class Seldom:
+class RateLimitedLog:
     """Logs an event of one kind at once, then at most once a period, with how many it left out.
 
     What follows a colon and a blank tells of one event and is no kind: `BadStepError: step 7 …` is

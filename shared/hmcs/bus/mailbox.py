@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 Work = Callable[[], None]
 
-EVERY_ONE_BOUND = 10_000
+KEEP_ALL_BOUND = 10_000
 """Messages a subscription that gets every one may have pending; more are lost, and so counted."""
-EVERY_ONE_BYTES = 64 * 1024 * 1024
+KEEP_ALL_BYTES = 64 * 1024 * 1024
 """Their bytes together: a flood of large messages must not fill the memory of a process."""
 SENDER_SHARE = 4
 """One sender may take the n-th part of that room, so that its flood leaves room for the others."""
@@ -74,7 +74,7 @@ class Arrival(NamedTuple):
     """Of the payload; of one that was too large to be taken in only this is known."""
 
 
-class NewestWins:
+class KeepLast:
     """Keeps the newest message of each key and sender until it is handled.
 
     Of each sender: where two write on one key, it is for the service to say whom it hears.
@@ -118,7 +118,7 @@ class NewestWins:
         self._handle(arrival)
 
 
-class EveryOne:
+class KeepAll:
     """Keeps every message, in order, up to a bound in number and in bytes."""
 
     def __init__(
@@ -126,8 +126,8 @@ class EveryOne:
         mailbox: Mailbox,
         handle: Callable[[Arrival], None],
         overflowed: Callable[[], None],
-        bound: int = EVERY_ONE_BOUND,
-        bound_bytes: int = EVERY_ONE_BYTES,
+        bound: int = KEEP_ALL_BOUND,
+        bound_bytes: int = KEEP_ALL_BYTES,
     ) -> None:
         self._mailbox = mailbox
         self._handle = handle

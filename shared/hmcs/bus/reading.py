@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Generic, NamedTuple, TypeVar
 
 from hmcs.bus.counters import Counters, Sequences
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Envelope, Message
 from hmcs.bus.wire import RefusedMessageError, check_size, decode, envelope_of
@@ -26,13 +26,13 @@ class Received(NamedTuple, Generic[M]):
 class Reader:
     """Decodes what arrived, counts it, and follows the sequence numbers of its sources."""
 
-    def __init__(self, counters: Counters, seldom: Seldom) -> None:
+    def __init__(self, counters: Counters, seldom: RateLimitedLog) -> None:
         self._counters = counters
-        self._seldom = seldom
+        self._limited = seldom
         self._sequences = Sequences()
 
     def read(
-        self, message_type: type[M], arrival: Arrival, *, newest_wins: bool
+        self, message_type: type[M], arrival: Arrival, *, keep_last: bool
     ) -> Received[M] | None:
         """Return the message that arrived, or None where it cannot be used.
 
@@ -52,7 +52,7 @@ class Reader:
                 self._note(arrival, refused, schema)
             return None
         is_news = self._note(arrival, envelope, schema)
-        if newest_wins and not is_news:
+        if keep_last and not is_news:
             self._counters.count_late(schema)
             return None
         return Received(body, envelope, arrival.received_ns, arrival.key)
@@ -60,11 +60,11 @@ class Reader:
     def refuse(self, schema: str, key: str, error: RefusedMessageError) -> None:
         """Count and log what came on `key` and is no message of `schema`."""
         self._counters.count_refused(schema, str(error))
-        self._seldom.warning(f"refused {key}", "message refused", key=key, reason=str(error))
+        self._limited.warning(f"refused {key}", "message refused", key=key, reason=str(error))
 
     def overflowed(self, key: str) -> None:
         """Log that messages on `key` find no place to wait."""
-        self._seldom.warning(
+        self._limited.warning(
             f"overflow {key}", "messages come faster than they are handled: some are lost", key=key
         )
 
@@ -75,7 +75,7 @@ class Reader:
         if lost:
             self._counters.lost[schema] += lost
             source = f"{envelope.source.service}/{envelope.source.instance}"
-            self._seldom.warning(
+            self._limited.warning(
                 f"lost {arrival.key}", "messages lost", key=arrival.key, source=source, lost=lost
             )
         return lost is not None

@@ -27,7 +27,7 @@ from typing import Any, ClassVar
 
 from hmcs.bus.answering import LoopHangsError
 from hmcs.bus.keys import KeyNameError
-from hmcs.bus.logs import Seldom, open_log
+from hmcs.bus.logs import RateLimitedLog, open_log
 from hmcs.bus.messages import Ask, Description, Health, SettingsReport
 from hmcs.bus.rights import rights_of, roles
 from hmcs.bus.session import Bus, StoppedError
@@ -181,7 +181,7 @@ class _Life:
     def __init__(self, service: Service) -> None:
         self._service = service
         self._bus = service.bus
-        self._seldom = Seldom(service.log)
+        self._limited = RateLimitedLog(service.log)
         self._beside = ThreadPoolExecutor(2, thread_name_prefix="health")
         self._began_s = time.monotonic()
         self._failures = 0
@@ -207,7 +207,7 @@ class _Life:
             self._failures += 1
             self._failed_s = time.monotonic()
             self._failure = f"{type(error).__name__}: {error}"[:FAILURE_LETTERS]
-            self._seldom.warning(
+            self._limited.warning(
                 type(error).__name__,
                 "a handler failed: going on",
                 exc_info=not isinstance(error, UserError),

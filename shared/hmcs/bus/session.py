@@ -26,12 +26,12 @@ from hmcs.bus.config import BusSettings
 from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
 from hmcs.bus.counters import Counters
 from hmcs.bus.keys import ANY, Keys, check_name
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.loop import Loop
-from hmcs.bus.mailbox import Arrival, EveryOne, Listening, Mailbox, NewestWins
+from hmcs.bus.mailbox import Arrival, KeepAll, KeepLast, Listening, Mailbox
 from hmcs.bus.messages import Envelope, Message, Origin, Source
 from hmcs.bus.presence import Present, is_token, present
-from hmcs.bus.qos import STANCES, Stance
+from hmcs.bus.qos import QOS_PROFILES, QosProfile
 from hmcs.bus.questions import (
     Answer,
     RequestRefusedError,
@@ -159,8 +159,8 @@ class Bus:
         self._session = session
         self._log = log
         self._stopping = stopping
-        self._seldom = Seldom(log)
-        self._reader = Reader(self.counters, self._seldom)
+        self._limited = RateLimitedLog(log)
+        self._reader = Reader(self.counters, self._limited)
         self._mailbox = Mailbox()
         self._timers = Timers()
         self._loop = Loop(self._mailbox, self._timers, self.counters, stopping)
@@ -208,19 +208,19 @@ class Bus:
     # --- publish and subscribe --------------------------------------------------------------------
 
     def publisher(self, message_type: type[M], key: str) -> Publisher[M]:
-        """Return a publisher of `message_type` on `key`, with the stance of the table in `qos`.
+        """Return a publisher of `message_type` on `key`, with the profile of the table in `qos`.
 
         A last chunk that stands for any instance becomes this process' own.
         """
         if key.endswith(f"/{ANY}"):
             key = key.removesuffix(ANY) + self.source.instance
-        stance = _stance(message_type)
+        profile = _profile(message_type)
         check_right(self.rights, "says", key)
         publisher = self._session.declare_publisher(
             key,
-            priority=getattr(zenoh.Priority, stance.priority.upper()),
-            congestion_control=getattr(zenoh.CongestionControl, stance.congestion.upper()),
-            reliability=getattr(zenoh.Reliability, stance.reliability.upper()),
+            priority=getattr(zenoh.Priority, profile.priority.upper()),
+            congestion_control=getattr(zenoh.CongestionControl, profile.congestion.upper()),
+            reliability=getattr(zenoh.Reliability, profile.reliability.upper()),
             express=False,
         )
         self.publishes.append(key)
@@ -234,17 +234,17 @@ class Bus:
 
         What is no message of `message_type` is refused, counted and logged.
         """
-        newest_wins = _stance(message_type).delivery == "newest_wins"
+        keep_last = _profile(message_type).delivery == "keep_last"
         check_right(self.rights, "hears", key)
         # Each subscription follows sequence numbers by itself: it sees every message anew.
-        reader = Reader(self.counters, self._seldom)
+        reader = Reader(self.counters, self._limited)
 
         def handle(arrival: Arrival) -> None:
-            received = reader.read(message_type, arrival, newest_wins=newest_wins)
+            received = reader.read(message_type, arrival, keep_last=keep_last)
             if received is not None:
                 handler(received)
 
-        box = (NewestWins if newest_wins else EveryOne)(
+        box = (KeepLast if keep_last else KeepAll)(
             self._mailbox, handle, lambda: reader.overflowed(key)
         )
         largest_bytes = BOUNDS[message_type].size_bytes
@@ -366,7 +366,9 @@ class Bus:
                 self._refuse_token(token)
                 return
             if alive and len(living) >= TOKENS_BOUND:
-                self._seldom.warning("tokens", "too many tokens: one more is left out", token=token)
+                self._limited.warning(
+                    "tokens", "too many tokens: one more is left out", token=token
+                )
                 return
             (living.add if alive else living.discard)(token)
             handler(token, alive)
@@ -400,7 +402,7 @@ class Bus:
 
     def _refuse_token(self, token: str) -> None:
         self.counters.count_refused("presence", token)
-        self._seldom.warning("token", "presence under an impossible name: refused", token=token)
+        self._limited.warning("token", "presence under an impossible name: refused", token=token)
 
     # --- the loop ---------------------------------------------------------------------------------
 
@@ -451,13 +453,13 @@ class Bus:
             )
 
 
-def _stance(message_type: type[Message]) -> Stance:
+def _profile(message_type: type[Message]) -> QosProfile:
     try:
-        return STANCES[message_type]
+        return QOS_PROFILES[message_type]
     except KeyError:
         raise ValueError(
-            f"{message_type.__name__} is not published: it has no stance in hmcs.bus.qos "
-            f"(those that have: {', '.join(sorted(m.__name__ for m in STANCES))})"
+            f"{message_type.__name__} is not published: it has no profile in hmcs.bus.qos "
+            f"(those that have: {', '.join(sorted(m.__name__ for m in QOS_PROFILES))})"
         ) from None
 
 

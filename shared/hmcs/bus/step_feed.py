@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from hmcs.bus.keys import ANY, is_name
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import LastStepsQuestion, Origin, Pairing, Step
 from hmcs.bus.session import Bus, Received
 from hmcs.bus.timers import NS_PER_S
@@ -61,7 +61,7 @@ class StepFeed:
         that could not be filled. Before it up to `memory_steps` earlier steps are fetched.
         """
         self._bus = bus
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._on_step = on_step
         self._on_restart = on_restart
         self._memory_steps = memory_steps
@@ -156,7 +156,7 @@ class StepFeed:
                     f"{self._next if newest is None else newest + 1}"
                 )
                 return False
-            self._seldom.warning(
+            self._limited.warning(
                 "gap", "missed steps could not be fetched: beginning anew", step=index
             )
         self._next = index
@@ -237,7 +237,7 @@ class StepFeed:
 
     def _refuse(self, reason: str) -> None:
         self._bus.counters.count_refused(Step.SCHEMA, reason)
-        self._seldom.warning("refused step", "step refused", reason=reason)
+        self._limited.warning("refused step", "step refused", reason=reason)
 
 
 class _Fetched(NamedTuple):

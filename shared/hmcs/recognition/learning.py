@@ -12,7 +12,7 @@ from hmcs.motion.paths import mean_path
 from hmcs.motion.turns import mean_turns
 from hmcs.recognition.disagreement import turn_agreement
 from hmcs.recognition.model import Model
-from hmcs.recognition.registry import DEFAULT, Lesson, kind_named
+from hmcs.recognition.registry import DEFAULT, TrainingData, kind_named
 from hmcs.recognition.segments import Array, LearningError, Segment, segments_of
 from hmcs.task import Task
 
@@ -46,7 +46,7 @@ def learn(
             )
         plural = "" if len(own) == 1 else "s"
         progress(f"{gesteme.name}: {len(own)} demonstration{plural}")
-    lesson = Lesson(
+    data = TrainingData(
         task,
         tuple(demonstrations),
         tuple(segments),
@@ -54,7 +54,7 @@ def learn(
         np.random.default_rng(0) if rng is None else rng,
         progress,
     )
-    knowledge = kind.learn(lesson)
+    knowledge = kind.learn(data)
     turns = tuple(map(_turns, by_gesteme))
     paths = [mean_path([segment.positions for segment in own]) for own in by_gesteme]
     return Model(

@@ -20,16 +20,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
 from hmcs.recognition.checking import LARGEST, check_shapes, check_within
-from hmcs.recognition.content import (
-    AnyArray,
-    Content,
-    array_names,
-    put_together,
-    taken_apart,
-)
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_archive import ARRAYS, MANIFEST, MOST_BYTES, Archive, ArchiveError
 from hmcs.recognition.registry import kind_named
+from hmcs.recognition.serialization import (
+    AnyArray,
+    Content,
+    array_names,
+    from_arrays,
+    to_arrays,
+)
 from hmcs.task import Task
 from hmcs.task.values import Name
 from hmcs.whole_files import written_whole
@@ -131,7 +131,7 @@ def load_model(path: str | Path, *, verify: Callable[[Path, bytes], None] | None
 def check_model(model: Model) -> None:
     """Raise ValueError where `load_model` would not take a model's knowledge or guides."""
     kind = kind_named(model.recognizer)
-    put_together(kind.knowledge, taken_apart(model.knowledge))
+    from_arrays(kind.knowledge, to_arrays(model.knowledge))
     kind.check(model.knowledge, model.task)
     _check_guides(model)
 
@@ -160,7 +160,7 @@ def _model(source: Path, fields: dict[str, Any], manifest: Manifest, archive: Ar
         guides = [f"{begin}{k}" for begin in (_PATH, _SPREAD) for k in gestemes]
         own = array_names(manifest.knowledge)
         arrays = archive.arrays([*guides, *own], [f"{_TURN}{k}" for k in gestemes])
-        knowledge: Any = put_together(
+        knowledge: Any = from_arrays(
             kind.knowledge, Content(manifest.knowledge, {name: arrays[name] for name in own})
         )
         kind.check(knowledge, manifest.task)
@@ -211,7 +211,7 @@ def _check_guides(model: Model) -> None:
 
 def _parts(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     """Return the manifest as JSON, and the arrays by name."""
-    content = taken_apart(model.knowledge)
+    content = to_arrays(model.knowledge)
     arrays = dict(content.arrays)
     for k, (points, spread) in enumerate(zip(model.path_points, model.path_spreads, strict=True)):
         arrays |= {f"{_PATH}{k}": points, f"{_SPREAD}{k}": spread}

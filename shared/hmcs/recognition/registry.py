@@ -25,7 +25,7 @@ DEFAULT = "segment-filter"
 GROUP = "hmcs.recognizers"
 
 
-class Lesson(NamedTuple):
+class TrainingData(NamedTuple):
     """What a recognizer learns from."""
 
     task: Task
@@ -38,7 +38,7 @@ class Lesson(NamedTuple):
     progress: Callable[[str], None]
 
 
-class Kind(NamedTuple):
+class RecognizerSpec(NamedTuple):
     """A kind of recognizer."""
 
     name: str
@@ -50,7 +50,7 @@ class Kind(NamedTuple):
     """The choices of learning it: a NamedTuple whose defaults are good without tuning."""
     knowledge: type
     """What it learns: a NamedTuple of arrays, numbers, strings and such tuples."""
-    learn: Callable[[Lesson], Any]
+    learn: Callable[[TrainingData], Any]
     """Returns the knowledge."""
     recognizer: Callable[[Model, bool], Recognizer]
     """Makes a fresh recognizer of a model; with True, one that may begin in any state."""
@@ -63,13 +63,13 @@ def _registered() -> Mapping[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 
-def kinds() -> tuple[Kind, ...]:
+def kinds() -> tuple[RecognizerSpec, ...]:
     """Return all registered kinds, the default first, then by name."""
     names = sorted(_registered(), key=lambda name: (name != DEFAULT, name))
     return tuple(kind_named(name) for name in names)
 
 
-def kind_named(name: str) -> Kind:
+def kind_named(name: str) -> RecognizerSpec:
     """Return the kind of that name; raises UserError where none is registered."""
     entry = _registered().get(name)
     if entry is None:
@@ -78,11 +78,11 @@ def kind_named(name: str) -> Kind:
             f"unknown recognizer {name!r}: choose one of {', '.join(sorted(_registered()))} "
             f"(`hmcs recognizers` says what each is){baselines}"
         )
-    kind: Kind = entry.load()
+    kind: RecognizerSpec = entry.load()
     return kind
 
 
-def settings_of(kind: Kind, given: Mapping[str, str]) -> Any:
+def settings_of(kind: RecognizerSpec, given: Mapping[str, str]) -> Any:
     """Return a kind's settings with some given as text, names joined by dots where they nest.
 
     Raises UserError for a name that is none of its settings, or a value that does not fit.

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.bus.logs import MOST_KINDS, JsonLines, Seldom, open_log
+from hmcs.bus.logs import MOST_KINDS, JsonLines, RateLimitedLog, open_log
 
 
 class Terminal(io.StringIO):
@@ -57,7 +57,7 @@ def test_less_severe_events_are_left_out(level, lines) -> None:
 
 def test_repeated_events_are_logged_seldom_and_say_how_many_were_left_out(caplog) -> None:
     now_s = [0.0]
-    seldom = Seldom(logging.getLogger("seldom"), period_s=5.0, clock=lambda: now_s[0])
+    seldom = RateLimitedLog(logging.getLogger("seldom"), period_s=5.0, clock=lambda: now_s[0])
     for _ in range(4):
         seldom.warning("a", "lost")
     seldom.warning("b", "other")
@@ -105,7 +105,7 @@ def test_the_time_of_a_line_is_the_time_of_its_event(seconds) -> None:
 
 
 def test_failures_that_differ_in_what_they_tell_are_of_one_kind(caplog) -> None:
-    seldom = Seldom(logging.getLogger("seldom"), clock=lambda: 0.0)
+    seldom = RateLimitedLog(logging.getLogger("seldom"), clock=lambda: 0.0)
     for step in range(1000):
         seldom.warning(f"BadStepError: step {step} of {step:x}", "a handler failed: going on")
         seldom.warning(f"sample {step}", "sample refused")
@@ -113,7 +113,7 @@ def test_failures_that_differ_in_what_they_tell_are_of_one_kind(caplog) -> None:
 
 
 def test_what_comes_of_different_keys_is_of_different_kinds(caplog) -> None:
-    seldom = Seldom(logging.getLogger("seldom"), clock=lambda: 0.0)
+    seldom = RateLimitedLog(logging.getLogger("seldom"), clock=lambda: 0.0)
     seldom.warning("lost cell/model/m/evidence/classifier-1", "lost")
     seldom.warning("lost cell/model/m/evidence/classifier-2", "lost")
     assert len(caplog.records) == 2
@@ -121,7 +121,7 @@ def test_what_comes_of_different_keys_is_of_different_kinds(caplog) -> None:
 
 def test_kinds_that_are_made_up_are_bounded_and_what_was_left_out_is_told(caplog) -> None:
     now_s = [0.0]
-    seldom = Seldom(logging.getLogger("seldom"), period_s=5.0, clock=lambda: now_s[0])
+    seldom = RateLimitedLog(logging.getLogger("seldom"), period_s=5.0, clock=lambda: now_s[0])
     names = ["".join(word) for word in itertools.product("abcdefghij", repeat=3)]
     for name in names:
         seldom.warning(f"refused {name}", "refused")

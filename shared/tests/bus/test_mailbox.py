@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.bus.mailbox import SENDER_SHARE, Arrival, EveryOne, Mailbox, NewestWins
+from hmcs.bus.mailbox import SENDER_SHARE, Arrival, KeepAll, KeepLast, Mailbox
 
 
 def drain(mailbox: Mailbox) -> None:
@@ -16,9 +16,9 @@ def arrivals(keys: list[str]) -> list[Arrival]:
 
 
 @given(st.lists(st.sampled_from("abc")))
-def test_every_one_hands_on_everything_in_order(keys) -> None:
+def test_keep_all_hands_on_everything_in_order(keys) -> None:
     mailbox, got = Mailbox(), []
-    box = EveryOne(mailbox, got.append, lambda: None)
+    box = KeepAll(mailbox, got.append, lambda: None)
     for arrival in arrivals(keys):
         box.arrive(arrival)
     drain(mailbox)
@@ -26,9 +26,9 @@ def test_every_one_hands_on_everything_in_order(keys) -> None:
 
 
 @given(st.lists(st.one_of(st.sampled_from("abc"), st.none())))
-def test_newest_wins_hands_on_the_newest_of_each_key_and_accounts_for_the_rest(keys) -> None:
+def test_keep_last_hands_on_the_newest_of_each_key_and_accounts_for_the_rest(keys) -> None:
     mailbox, got, handed_in = Mailbox(), [], 0
-    box = NewestWins(mailbox, got.append)
+    box = KeepLast(mailbox, got.append)
     newest: dict[str, bytes] = {}
     for number, key in enumerate([*keys, None]):
         if key is not None:
@@ -44,10 +44,10 @@ def test_newest_wins_hands_on_the_newest_of_each_key_and_accounts_for_the_rest(k
 
 
 @given(st.integers(1, 5), st.integers(0, 40))
-def test_every_one_is_bounded_and_says_once_that_it_overflows(share, count) -> None:
+def test_keep_all_is_bounded_and_says_once_that_it_overflows(share, count) -> None:
     mailbox, got, overflows = Mailbox(), [], []
     bound = share * SENDER_SHARE
-    box = EveryOne(mailbox, got.append, lambda: overflows.append(len(got)), bound=bound)
+    box = KeepAll(mailbox, got.append, lambda: overflows.append(len(got)), bound=bound)
     for arrival in arrivals(["a"] * count):
         box.arrive(arrival)
     drain(mailbox)
@@ -57,7 +57,7 @@ def test_every_one_is_bounded_and_says_once_that_it_overflows(share, count) -> N
 
 def test_the_flood_of_one_sender_leaves_room_for_another() -> None:
     mailbox, got = Mailbox(), []
-    box = EveryOne(mailbox, got.append, lambda: None, bound=8)
+    box = KeepAll(mailbox, got.append, lambda: None, bound=8)
     for number in range(100):
         box.arrive(Arrival("a", b"", number, b"flood"))
     honest = Arrival("a", b"", 100, b"honest")
@@ -69,7 +69,7 @@ def test_the_flood_of_one_sender_leaves_room_for_another() -> None:
 
 def test_messages_that_wait_are_bounded_in_bytes_too_and_once_handled_make_room() -> None:
     mailbox, got = Mailbox(), []
-    box = EveryOne(mailbox, got.append, lambda: None, bound_bytes=400)
+    box = KeepAll(mailbox, got.append, lambda: None, bound_bytes=400)
     for _ in range(3):
         for number in range(100):
             box.arrive(Arrival("a", bytes(30), number))
@@ -77,9 +77,9 @@ def test_messages_that_wait_are_bounded_in_bytes_too_and_once_handled_make_room(
     assert [arrival.received_ns for arrival in got] == [0, 1, 2] * 3
 
 
-def test_newest_wins_keeps_of_so_many_senders_and_says_once_that_it_overflows() -> None:
+def test_keep_last_keeps_of_so_many_senders_and_says_once_that_it_overflows() -> None:
     mailbox, got, overflows = Mailbox(), [], []
-    box = NewestWins(mailbox, got.append, lambda: overflows.append(1), most_senders=3)
+    box = KeepLast(mailbox, got.append, lambda: overflows.append(1), most_senders=3)
     for number in range(10):
         box.arrive(Arrival("a", b"", number, str(number).encode()))
     box.arrive(Arrival("a", b"", 10, b"0"))
@@ -94,7 +94,7 @@ def test_newest_wins_keeps_of_so_many_senders_and_says_once_that_it_overflows() 
 
 def test_after_an_overflow_there_is_room_again() -> None:
     mailbox, got = Mailbox(), []
-    box = EveryOne(mailbox, got.append, lambda: None, bound=1)
+    box = KeepAll(mailbox, got.append, lambda: None, bound=1)
     for _ in range(2):
         for _ in range(2):
             box.arrive(Arrival("a", b"", 0))
@@ -110,7 +110,7 @@ def test_waking_ends_a_wait_with_nothing_to_do() -> None:
 
 def test_of_two_senders_on_one_key_neither_takes_the_others_place() -> None:
     mailbox, got = Mailbox(), []
-    box = NewestWins(mailbox, got.append)
+    box = KeepLast(mailbox, got.append)
     for number, sender in enumerate([b"one", b"two", b"one"]):
         box.arrive(Arrival("a", str(number).encode(), number, sender))
     drain(mailbox)

@@ -53,7 +53,7 @@ def wait_for_arrival(receiver: Bus, until, count: int) -> None:
 # --- publish and subscribe ------------------------------------------------------------------------
 
 
-def test_every_one_arrives_in_order_with_its_envelope(pair) -> None:
+def test_keep_all_arrives_in_order_with_its_envelope(pair) -> None:
     sender, receiver, publisher = pair
     got = []
     receiver.subscribe(Step, receiver.keys.step, got.append)

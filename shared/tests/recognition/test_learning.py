@@ -5,13 +5,13 @@ import pytest
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step, steps_of
-from hmcs.recognition.content import taken_apart
 from hmcs.recognition.learning import learn
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings, fit_gestemes
 from hmcs.recognition.segment_filter.gestemes import GestemeBank, Scoring
 from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
 from hmcs.recognition.segment_filter.variants import VariantSettings
 from hmcs.recognition.segments import LearningError, Segment, segments_of
+from hmcs.recognition.serialization import to_arrays
 from hmcs.task import Task
 
 ORDER = ["along", "round", "up", "along", "round", "up"]
@@ -60,7 +60,7 @@ def test_motion_that_is_no_part_of_the_task_raises_the_alarm_and_the_task_does_n
 def test_learning_twice_gives_the_same_model(task, performances):
     demonstrations = [performances(["along", "round", "up"], seed) for seed in range(2)]
     one, other = learn(task, demonstrations), learn(task, demonstrations)
-    ours, theirs = (taken_apart(each.knowledge) for each in (one, other))
+    ours, theirs = (to_arrays(each.knowledge) for each in (one, other))
     assert ours.plain == theirs.plain
     for name, array in ours.arrays.items():
         np.testing.assert_array_equal(array, theirs.arrays[name], name)

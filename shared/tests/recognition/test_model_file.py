@@ -6,8 +6,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from hmcs.recognition.content import taken_apart
 from hmcs.recognition.model_file import ModelFileError, load_model, save_model, with_hash
+from hmcs.recognition.serialization import to_arrays
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_a_model_comes_back_as_it_was(saved):
     assert loaded.hash == model.hash
     assert loaded.task == model.task
     assert loaded.recognizer == "segment-filter"
-    ours, theirs = taken_apart(model.knowledge), taken_apart(loaded.knowledge)
+    ours, theirs = to_arrays(model.knowledge), to_arrays(loaded.knowledge)
     assert ours.plain == theirs.plain
     for name, array in ours.arrays.items():
         np.testing.assert_array_equal(array, theirs.arrays[name], name)

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import Handle
 from hmcs.bus.session import Bus
 from hmcs_console.operating.handles import Gone, Operating, Outcome, Stopped, after, waited
@@ -32,7 +32,7 @@ class Hands:
         self._counters = bus.counters
         self._lease_s = lease_s
         self._log = log
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._stopped = stopped
         self._handles = bus.publisher(Handle, bus.keys.handle)
         self._flooding: set[int] = set()
@@ -80,7 +80,7 @@ class Hands:
 
     def _flooded(self, client: int | None, count: int) -> None:
         self._counters.refused[FLOOD] += count
-        self._seldom.warning(FLOOD, "more than a hand can do", page=client, dropped=count)
+        self._limited.warning(FLOOD, "more than a hand can do", page=client, dropped=count)
         if client is not None and client not in self._flooding:
             self._flooding.add(client)
             self._page.tell(client, "this page does more than a hand can: some of it is left out")

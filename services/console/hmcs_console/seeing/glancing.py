@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgpack
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import Message
 from hmcs.bus.reading import Reader, Received
@@ -43,7 +43,7 @@ class Glance(Generic[M]):
         bus: Bus,
         message_type: type[M],
         key: str,
-        seldom: Seldom,
+        seldom: RateLimitedLog,
         caused: Callable[[Cause, int], None],
         newest: Callable[[Received[M]], None],
     ) -> None:
@@ -71,7 +71,7 @@ class Glance(Generic[M]):
     def _look(self) -> None:
         waiting, self._waiting = self._waiting, {}
         for arrival in waiting.values():
-            received = self._reader.read(self._type, arrival, newest_wins=True)
+            received = self._reader.read(self._type, arrival, keep_last=True)
             if received is not None:
                 self._newest(received)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from hmcs.bus.keys import ANY, Member, is_name, recognizer_in
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import Belief, Evidence, FixtureState, Motion, RobotState, Step
 from hmcs.bus.session import Bus, Received
 from hmcs_console.seeing.gathered import usable
@@ -30,7 +30,7 @@ class Listening:
         self._bus = bus
         self._seen = seen
         keys = bus.keys
-        self._seldom = seldom = Seldom(log)
+        self._limited = seldom = RateLimitedLog(log)
         loop = seen.in_fast_loop
         Glance(
             bus,
@@ -99,7 +99,7 @@ class Listening:
         if is_name(name):
             return name
         self._bus.counters.count_refused(schema, "its key names no recognizer")
-        self._seldom.warning("name", "a key names no recognizer: refused", key=key)
+        self._limited.warning("name", "a key names no recognizer: refused", key=key)
         return None
 
     def _in_slow_loop(self, stage: str, received: Received[Step] | Received[Belief]) -> None:

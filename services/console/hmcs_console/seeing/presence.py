@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable
 
 from hmcs.bus.keys import ANY, Member
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.session import Bus
 from hmcs_console.seeing.seen import Seen
 
@@ -28,7 +28,7 @@ class Presence:
         """Begin to follow them; `came` is told of each process that comes, but of this one."""
         self._bus = bus
         self._seen = seen
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._came = came
         self._working: set[tuple[str, Member]] = set()
         """Models, each with a process that works for it."""
@@ -62,4 +62,4 @@ class Presence:
 
     def _refuse(self, key: str, reason: str) -> None:
         self._bus.counters.count_refused(REFUSED, reason)
-        self._seldom.warning(REFUSED, "presence refused", key=key, reason=reason)
+        self._limited.warning(REFUSED, "presence refused", key=key, reason=reason)

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from typing import Any, NamedTuple, Protocol
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.service import UserError
 from hmcs_console.serving.admission import Admission, Head, head_of
 from hmcs_console.serving.answers import (
@@ -92,7 +92,7 @@ class Gateway:
         self._served = served
         self._page = page
         self._refused = refused
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._document = load_document()
         self._connections: Counter[str] = Counter()
         self._pages = 0
@@ -170,7 +170,7 @@ class Gateway:
     def _failed(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error = context.get("exception")
         reason = f"{context['message']}: {type(error).__name__}: {error}"
-        self._seldom.warning("failure", "a connection failed", reason=reason)
+        self._limited.warning("failure", "a connection failed", reason=reason)
 
     # --- connections ------------------------------------------------------------------------------
 
@@ -271,11 +271,11 @@ class Gateway:
 
     def _left_out(self, reason: str) -> None:
         self._refused(reason)
-        self._seldom.warning("nonsense", "a message of a browser is left out", reason=reason)
+        self._limited.warning("nonsense", "a message of a browser is left out", reason=reason)
 
     def _turn_away(self, kind: str, event: str, address: str, reason: str) -> None:
         self._refused(event)
-        self._seldom.warning(kind, event, address=address, reason=reason)
+        self._limited.warning(kind, event, address=address, reason=reason)
 
 
 async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from queue import Empty, Full, Queue
 from typing import Generic, TypeVar
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.shown import plain
 from hmcs_console.serving.pace import next_rate_hz
 
@@ -23,7 +23,7 @@ class Painter(Generic[T]):
     def __init__(self, draw: Callable[[T], None], wanted_hz: float, log: logging.Logger) -> None:
         self._draw = draw
         self._wanted_hz = wanted_hz
-        self._seldom = Seldom(log)
+        self._limited = RateLimitedLog(log)
         self._slot: Queue[T | None] = Queue(maxsize=1)
         self._next_s = 0.0
         self.rate_hz = wanted_hz
@@ -58,6 +58,6 @@ class Painter(Generic[T]):
                 self.failure = ""
             except Exception as error:
                 self.failure = plain(f"{type(error).__name__}: {error}")
-                self._seldom.warning("drawing", "a drawing failed: going on", exc_info=True)
+                self._limited.warning("drawing", "a drawing failed: going on", exc_info=True)
             took_s = time.monotonic() - began_s
             self.rate_hz = next_rate_hz(self.rate_hz, took_s, self._wanted_hz)

@@ -12,7 +12,7 @@ from typing import Any
 import viser
 from viser.infra import WebsockClientConnection
 
-from hmcs.bus.logs import Seldom
+from hmcs.bus.logs import RateLimitedLog
 from hmcs.shown import plain
 
 _LIBRARY_LOG = "websockets.server"
@@ -28,7 +28,7 @@ class Server(viser.ViserServer):
     def __init__(self, log: logging.Logger) -> None:
         with _quietly():
             super().__init__(host="127.0.0.1", port=0, label="HMCS", verbose=False)
-        self._told = _Told(Seldom(log))
+        self._told = _Told(RateLimitedLog(log))
         library = logging.getLogger(_LIBRARY_LOG)
         library.addHandler(self._told)
         library.propagate = False
@@ -66,9 +66,9 @@ class Server(viser.ViserServer):
 class _Told(logging.Handler):
     """Hands on what the library says, and what fails in its tasks."""
 
-    def __init__(self, seldom: Seldom) -> None:
+    def __init__(self, seldom: RateLimitedLog) -> None:
         super().__init__(logging.WARNING)
-        self._seldom = seldom
+        self._limited = seldom
 
     def emit(self, record: logging.LogRecord) -> None:
         error = record.exc_info[1] if record.exc_info else None
@@ -80,7 +80,7 @@ class _Told(logging.Handler):
 
     def _tell(self, what: str, error: BaseException | None) -> None:
         reason = what if error is None else f"{what}: {type(error).__name__}: {error}"
-        self._seldom.warning("library", "the page's server failed", reason=plain(reason))
+        self._limited.warning("library", "the page's server failed", reason=plain(reason))
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hmcs.fixtures.compliance.cues import stiffness_kept
 from hmcs.fixtures.compliance.factor import FREE_FACTOR, Line, crossing, optimal_compliance
-from hmcs.fixtures.guides.pull import beside, leaning
+from hmcs.fixtures.guides.pull import project_to_path, pulled_direction
 from hmcs.fixtures.guides.volumes import Knot, Volume
 from hmcs.fixtures.law import Gains, full_speed_gains
 from hmcs.fixtures.parts import PreferredSubspace
@@ -341,8 +341,8 @@ def _guided(settings: FieldSettings, factor: float, path: Path = CURVE) -> Field
     gains = full_speed_gains(factor)
 
     def field(place: Array, velocity: Array) -> Array:
-        found = beside(path, place, 0.0, path.length_m)
-        lean = leaning(
+        found = project_to_path(path, place, 0.0, path.length_m)
+        lean = pulled_direction(
             path.tangent(found.progress_m, 0.003),
             velocity,
             found.across,
@@ -361,7 +361,7 @@ def _volume_drawn(settings: FieldSettings, volume: Volume, found: str, path: Pat
     ax = picture.subplots()
 
     def field(place: Array, velocity: Array) -> Array:
-        at = beside(path, place, 0.0, path.length_m)
+        at = project_to_path(path, place, 0.0, path.length_m)
         error_m = float(np.linalg.norm(at.across))
         share = volume.stiffness(at.progress_m / path.length_m, error_m)
         if share == 0.0:

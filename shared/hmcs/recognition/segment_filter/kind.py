@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
-from hmcs.recognition.registry import Kind, Lesson
+from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segment_filter.checking import check_layers
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
 from hmcs.recognition.segment_filter.learning import learn_layers
 from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, Layers
 
 
-def _learn(lesson: Lesson) -> Layers:
-    return learn_layers(lesson.task, lesson.segments, lesson.settings, lesson.progress)
+def _learn(data: TrainingData) -> Layers:
+    return learn_layers(data.task, data.segments, data.settings, data.progress)
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return LayeredRecognizer(model, anywhere=anywhere)
 
 
-KIND = Kind(
+KIND = RecognizerSpec(
     name="segment-filter",
     summary="exact filter over (task state, segment start, gesteme phase) with an unknown state",
     source="HMCS; solves the restart problem of Aarno 2007, chapters 4 and 5",

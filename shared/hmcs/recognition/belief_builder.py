@@ -16,7 +16,7 @@ MEAN_STEPS = 20
 """The mean log-likelihood is taken over so many steps."""
 
 
-class Believer:
+class BeliefBuilder:
     """Says what is believed by a method that knows neither unknown motion nor an alarm."""
 
     def __init__(self) -> None:

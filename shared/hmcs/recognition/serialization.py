@@ -32,7 +32,7 @@ class ContentError(ValueError):
     """Content that is no knowledge of the kind expected; says what is wrong with it."""
 
 
-def taken_apart(knowledge: object) -> Content:
+def to_arrays(knowledge: object) -> Content:
     """Return the content of a recognizer's knowledge.
 
     Raises TypeError for what is neither array, number, string, truth value, None, tuple nor
@@ -62,7 +62,7 @@ def array_names(plain: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def put_together(kind: type[Knowledge], content: Content) -> Knowledge:
+def from_arrays(kind: type[Knowledge], content: Content) -> Knowledge:
     """Return the knowledge of that kind.
 
     Raises ContentError when a field or an array is missing, or of another type, or holds a number
