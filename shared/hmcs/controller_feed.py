@@ -50,7 +50,7 @@ class ControllerFeed:
             return None
         if source.boot != self.clock:
             self._begin(now_s, source.boot)
-        return self.controller.sampled(now_s, sample_of(motion, seq, origin))
+        return self.controller.on_sample(now_s, sample_of(motion, seq, origin))
 
     def on_step(self, now_s: float, source: Source, step: Step, origin: Origin | None) -> Verdict:
         """Take in a step, and the beliefs that had come before it."""
@@ -62,7 +62,7 @@ class ControllerFeed:
             return "old"
         self._newest = max(self._newest, step.index)
         number = None if origin is None else origin.seq
-        self.controller.stepped(now_s, step.index, step.position, step.displacement, number)
+        self.controller.on_step(now_s, step.index, step.position, step.displacement, number)
         for name in [n for n, belief in self._early.items() if belief.step <= self._newest]:
             self._believe(name, self._early.pop(name))
         return "taken"
@@ -101,7 +101,7 @@ class ControllerFeed:
     def _believe(self, name: str, belief: Belief) -> Verdict:
         if self._beliefs.note(name, self.clock, belief.step) is None:
             return "old"
-        self.controller.believed(name, segment_belief_of(belief))
+        self.controller.on_belief(name, segment_belief_of(belief))
         return "taken"
 
     def _begin(self, now_s: float, clock: str) -> None:

@@ -80,16 +80,16 @@ def session(regions: tuple[Region, ...], ticks: int) -> list[Work]:
     hand = np.array([0.1, -0.002, 0.0, 0.0, 0.0, 0.0])
     move = hand[:3] * PERIOD_S
     controller.robot_moved(0.0, np.zeros(3))
-    controller.sampled(0.0, OperatorSample(0, np.zeros(3), np.zeros(6), False, False))
+    controller.on_sample(0.0, OperatorSample(0, np.zeros(3), np.zeros(6), False, False))
 
     def between(number: int) -> None:
         controller.robot_moved(number * PERIOD_S, np.zeros(3))
-        controller.stepped(number * PERIOD_S, number - 1, move * (number - 1), move, None)
-        controller.believed("m", SegmentBelief(number - 1, "s", 1.0, "x", 0, 0.0, False, True))
+        controller.on_step(number * PERIOD_S, number - 1, move * (number - 1), move, None)
+        controller.on_belief("m", SegmentBelief(number - 1, "s", 1.0, "x", 0, 0.0, False, True))
 
     def tick(number: int) -> object:
         sample = OperatorSample(number, move * number, hand, True, False)
-        return controller.sampled(number * PERIOD_S, sample)
+        return controller.on_sample(number * PERIOD_S, sample)
 
     return [Work(partial(tick, n), partial(between, n)) for n in range(1, ticks + 1)]
 

@@ -63,7 +63,7 @@ def fixture(to: int) -> None:
     with connect(to) as following, accept(server) as before:
         for number, frame in enumerate(frames(before)):
             _, motion = decode(frame.payload, Motion)
-            made = controller.sampled(time.monotonic(), sample_of(motion, number, None))
+            made = controller.on_sample(time.monotonic(), sample_of(motion, number, None))
             command = command_of(made, 100.0)
             send(following, Frame(frame.caused_ns, encode(command, ENVELOPE)))
             encode(state_of(made), ENVELOPE)

@@ -78,7 +78,7 @@ def performance(
         motion = Motion(position=position, velocity=velocity, dead_man=count >= RESTING)
         yield logged(at_ns, KEYS.motion, motion, hand, origin)
         now_s = (at_ns - BEGUN_NS) / 1e9
-        fixture = controller.sampled(now_s, sample_of(motion, count, origin))
+        fixture = controller.on_sample(now_s, sample_of(motion, count, origin))
         source = others["fixture_controller"]
         yield logged(at_ns, KEYS.command, command_of(fixture, 80.0), source, origin)
         yield logged(at_ns, KEYS.fixture_state, state_of(fixture), source, origin)
@@ -86,9 +86,9 @@ def performance(
         if made is not None:
             step = Step(**made._asdict())
             yield logged(at_ns, KEYS.step, step, hand, origin)
-            controller.stepped(now_s, step.index, step.position, step.displacement, count)
+            controller.on_step(now_s, step.index, step.position, step.displacement, count)
             belief = belief_message(model, recognizer.step(step_of(step)), boot)
-            controller.believed(model.name, segment_belief_of(belief))
+            controller.on_belief(model.name, segment_belief_of(belief))
             if not controller.active:
                 controller.activate(model.name)
             at_ns += BELIEF_AFTER_NS

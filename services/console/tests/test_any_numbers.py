@@ -98,7 +98,7 @@ def keep(seen: Seen, said: Any) -> Take | None:
     """Take a message in as it is from the bus."""
     match said:
         case Belief() if not wrong_with(said):
-            seen.believed(10.0, "lines", said)
+            seen.on_belief(10.0, "lines", said)
         case Evidence() if usable(said):
             seen.evident("lines", said)
         case FixtureState():

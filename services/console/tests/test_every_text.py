@@ -81,7 +81,7 @@ ACTIVE = "demo"
 def keep_belief(seen: Seen, belief: Belief) -> None:
     if not wrong_with(belief):
         for name in (ACTIVE, "other"):
-            seen.believed(10.0, name, belief)
+            seen.on_belief(10.0, name, belief)
             seen.write_down(10.0)
 
 

@@ -155,7 +155,7 @@ class FixtureController(Service):
         wait_s = self.settings.stop_repeated_every_ms / 1e3
         try:
             if self._controller.input_stale(now_ns / NS_PER_S):
-                self._send(self._controller.waited(now_ns / NS_PER_S), None)
+                self._send(self._controller.on_timeout(now_ns / NS_PER_S), None)
             else:
                 wait_s = self._controller.input_good_for_s(now_ns / NS_PER_S) + WATCH_MARGIN_S
         finally:

@@ -69,7 +69,7 @@ class Playing:
         at_s = now_s if self._waits_since_s is None else self._waits_since_s
         return round((at_s - self._began_s) * self._rate_hz) / self._rate_hz
 
-    def waited(self, now_s: float) -> None:
+    def on_timeout(self, now_s: float) -> None:
         """Take in the time: it goes on where nothing is in the way any more."""
         if self._began_s is None or self._waits_since_s is None or self.stopped:
             return

@@ -129,7 +129,7 @@ class InputDevice(Service):
         now_s, playing = now_ns / _NS_PER_S, self._playing
         if self._may_play and not playing.begun and not playing.stopped and not self._missing():
             self._begin(now_s)
-        playing.waited(now_s)
+        playing.on_timeout(now_s)
         elapsed_s = playing.elapsed_s(now_s)
         if playing.rests and self._hand is not None:
             sample: DeviceSample | None = at_rest(self._hand)

@@ -37,7 +37,9 @@ class Desk:
         self.now_s += PERIOD_S
         self.device.seconds(self.now_s)
         sample = self.device.sample(0.0)
-        self.drives = self.fixture.sampled(self.now_s, sample.dead_man, sample.clutch) == "driving"
+        self.drives = (
+            self.fixture.on_sample(self.now_s, sample.dead_man, sample.clutch) == "driving"
+        )
         return sample
 
     def run(

@@ -49,7 +49,7 @@ class Desk:
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * RATE_HZ)):
             self.now_s += PERIOD_S
-            self.playing.waited(self.now_s)
+            self.playing.on_timeout(self.now_s)
             elapsed_s = self.playing.elapsed_s(self.now_s)
             held = elapsed_s is not None and not self.playing.rests
             self.held.append(held)

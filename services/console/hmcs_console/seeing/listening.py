@@ -80,7 +80,7 @@ class Listening:
             self._bus.counters.count_refused(Belief.SCHEMA, wrong)
             return
         source = received.envelope.source
-        self._seen.believed(now_s, name, belief, Member(source.service, source.instance))
+        self._seen.on_belief(now_s, name, belief, Member(source.service, source.instance))
         if name == self._seen.active(now_s):
             self._in_slow_loop("belief", received)
 

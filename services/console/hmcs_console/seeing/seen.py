@@ -153,7 +153,7 @@ class Seen:
             self.runners.forget(name)
         return bool(silent)
 
-    def believed(
+    def on_belief(
         self, now_s: float, recognizer: str, belief: Belief, by: Member | None = None
     ) -> None:
         """Take in what a recognizer that is admitted holds true, as a process says."""

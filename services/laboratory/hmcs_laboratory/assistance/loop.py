@@ -88,7 +88,7 @@ def perform(
     steps: list[Step] = []
     step_at: list[int] = []
     state, confidence, arrived = "", 0.0, False
-    controller.sampled(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
+    controller.on_sample(0.0, OperatorSample(0, hand, np.zeros(6), dead_man=False, clutch=False))
     for tick in range(1, int(most_s / period_s) + 1):
         now_s, tool = tick * period_s, robot.position
         controller.robot_moved(now_s, tool, robot.orientation)
@@ -101,15 +101,15 @@ def perform(
             twist = np.concatenate([motion.velocity, np.zeros(3)])
         else:
             hand, twist = tool, leading.push(motion.velocity, robot.orientation, period_s).twist
-        fixture = controller.sampled(
+        fixture = controller.on_sample(
             now_s, OperatorSample(tick, hand, twist, dead_man=True, clutch=False)
         )
         step = zone.push(hand)
         if step is not None:
-            controller.stepped(now_s, step.index, step.position, step.displacement, tick)
+            controller.on_step(now_s, step.index, step.position, step.displacement, tick)
             recognition = recognizer.step(step)
             belief = belief_of(model, recognition)
-            controller.believed(model.name, belief)
+            controller.on_belief(model.name, belief)
             state, confidence = belief.state, belief.probability
             steps.append(step)
             step_at.append(len(rows))
