@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,7 +23,6 @@ from hmcs.fixtures.regions.meshes import Mesh
 from hmcs.motion.paths import Path
 from hmcs.task import load_task
 
-Array = NDArray[np.float64]
 
 TICK_US = 100.0
 CLOSEST_US = 50.0

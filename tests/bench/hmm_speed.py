@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -17,7 +19,6 @@ from hmcs.recognition.hmm.topologies import fully_connected, left_right, start_a
 from hmcs_baselines.hmm.bank import ForwardBank, GaussianScores
 from hmcs_baselines.hmm.batch import baum_welch_many
 
-Array = NDArray[np.float64]
 
 LEARNING_RATIO = 5.0
 SAME_LIKELIHOOD = 1e-6

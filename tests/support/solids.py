@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable
 
 import numpy as np
@@ -14,7 +16,6 @@ from hmcs.fixtures.regions.meshes import Mesh
 from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape
 from hmcs.motion.quaternions import unit_quaternion
 
-Array = NDArray[np.float64]
 
 TOOLS = {
     "point": ToolShape.ball(0.0),

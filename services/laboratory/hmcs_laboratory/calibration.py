@@ -7,12 +7,13 @@ left is that none of the classes is true.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BINS = 15

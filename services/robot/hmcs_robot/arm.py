@@ -6,6 +6,8 @@ no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from itertools import combinations
 
 import numpy as np
@@ -13,7 +15,7 @@ import pybullet
 
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
-from hmcs_robot.driver import Array, JointLimits, Pose
+from hmcs_robot.driver import JointLimits, Pose
 from hmcs_robot.robots import RobotModel
 
 BASE_LINK = -1

@@ -6,6 +6,8 @@ nobody reads. Towards control only small, already validated orders go; back come
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import hashlib
 import socket
 import struct
@@ -15,7 +17,6 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from hmcs_robot.driver import Array
 from hmcs_robot.supervision import Order, Stop
 
 LARGEST_BYTES = 65_536

@@ -10,6 +10,8 @@ where it came to rest.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +20,7 @@ import numpy as np
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.motion import quaternions
-from hmcs_robot.driver import ArmState, Array, Pose
+from hmcs_robot.driver import ArmState, Pose
 from hmcs_robot.limits import (
     Limits,
     bounds_of,

@@ -7,6 +7,8 @@ for, however fine the mesh is. Halved where most of them is empty, they lie alon
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import heapq
 from itertools import count
 from typing import NamedTuple
@@ -15,7 +17,6 @@ import numpy as np
 
 from hmcs.fixtures.regions.clusters import principal_boxes
 from hmcs.fixtures.regions.surfaces import area_vectors
-from hmcs_robot.driver import Array
 
 LEAST_HALF_M = 1e-4
 """Half as thick as any box at least: flat ones have no inside."""

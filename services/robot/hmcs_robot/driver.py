@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -9,7 +11,6 @@ from numpy.typing import NDArray
 
 from hmcs_robot.looks import Looks
 
-Array = NDArray[np.float64]
 
 
 class Pose(NamedTuple):

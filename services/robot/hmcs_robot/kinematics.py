@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
-from hmcs_robot.driver import Array, JointLimits, Pose
+from hmcs_robot.driver import JointLimits, Pose
 
 _ACCURACY_M = 1e-6
 _ITERATIONS = 150

@@ -6,6 +6,8 @@ velocities come last, are linear, and always admit standing still.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +16,7 @@ import numpy as np
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.fixtures.regions.keep_out import KeepOut
-from hmcs_robot.driver import ArmState, Array, JointLimits
+from hmcs_robot.driver import ArmState, JointLimits
 
 _NOTHING = 1e-6
 """A bound approached more slowly than this (rad/s, m/s) is not approached."""

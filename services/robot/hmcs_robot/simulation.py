@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -12,7 +14,7 @@ from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm
 from hmcs_robot.bodies import add_obstacle, add_region, links_touching
-from hmcs_robot.driver import ArmState, Array, LinkNear, Nearest, Pose, Touch
+from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
 from hmcs_robot.looks import Looks, looks_of
 from hmcs_robot.robots import ROBOTS

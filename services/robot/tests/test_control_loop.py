@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -15,7 +17,7 @@ from hmcs.fixtures.regions.tool_shape import ToolShape
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired
 from hmcs_robot.control import Tuning
 from hmcs_robot.control_loop import ControlLoop, Rules
-from hmcs_robot.driver import ArmState, Array, JointLimits, Pose
+from hmcs_robot.driver import ArmState, JointLimits, Pose
 from hmcs_robot.fence import Fence
 from hmcs_robot.limits import Limits
 from hmcs_robot.looks import Looks

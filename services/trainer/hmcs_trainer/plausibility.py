@@ -16,6 +16,8 @@ Each limit is taken from the task or from what hands can do:
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -41,7 +43,6 @@ REGULAR_SHARE = 0.95
 corners, written by hand, has no gaps."""
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "inches": 0.0254}
 
-Array = NDArray[np.float64]
 
 
 class Finding(NamedTuple):

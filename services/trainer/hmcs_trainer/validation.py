@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,13 +11,7 @@ import numpy as np
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.disagreement import check_agreement, turn_agreement
 from hmcs.recognition.segment_filter.gestemes import LONGEST_WINDOW_STEPS
-from hmcs.recognition.segments import (
-    Array,
-    LearningError,
-    Segment,
-    check_arrays,
-    segments_of,
-)
+from hmcs.recognition.segments import LearningError, Segment, check_arrays, segments_of
 from hmcs.task import Task
 from hmcs_trainer.plausibility import Finding, implausible, length_of
 

@@ -6,6 +6,8 @@ Shapes: M points, D axes, k clusters.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmcs.errors import UserError
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 

@@ -8,6 +8,8 @@ states, M gestemes, F dimensions, T steps.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -32,7 +34,6 @@ from hmcs_baselines.gesteme_hmms import (
     normals_of,
 )
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

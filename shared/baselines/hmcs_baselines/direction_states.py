@@ -7,6 +7,8 @@ Shapes: T steps, D axes, K directions.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -41,7 +43,6 @@ from hmcs_baselines.estimators import (
 from hmcs_baselines.hmm.bank import ForwardBank
 from hmcs_baselines.svm import SvmSettings
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 

@@ -12,6 +12,8 @@ Shapes: T_i points of demonstration i, D axes, K directions.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -32,7 +34,6 @@ from hmcs_baselines.line_sequence import (
     without_one,
 )
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 

@@ -5,6 +5,8 @@ Shapes: K slots (a slot is one gesteme in one task state), N directions, T steps
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -40,7 +42,6 @@ from hmcs_baselines.slots import (
     slot_index,
 )
 
-Array = NDArray[np.float64]
 
 
 class DirectionTaskSettings(NamedTuple):

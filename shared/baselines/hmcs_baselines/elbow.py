@@ -6,6 +6,8 @@ Shapes: K is the most clusters searched; entry i of an array over k belongs to k
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmcs_baselines.clustering import ClusteringError, Clusters, k_means
 
-Array = NDArray[np.float64]
 
 
 class ClusterSearch(NamedTuple):

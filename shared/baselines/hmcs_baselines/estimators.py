@@ -6,6 +6,8 @@ Shapes: T observations x of F dimensions, K classes.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +23,6 @@ from hmcs.recognition.checking import (
 from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs_baselines.svm import Machines, SvmSettings, fit_machines, log_observations
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 LEAST_WIDTH = 1e-9

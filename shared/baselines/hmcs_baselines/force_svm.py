@@ -7,6 +7,8 @@ Shapes: M categories, K slots (a slot is one gesteme in one task state), F compo
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -39,7 +41,6 @@ from hmcs_baselines.slots import (
 )
 from hmcs_baselines.svm import SvmSettings
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

@@ -6,6 +6,8 @@ F dimensions.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -28,7 +30,6 @@ from hmcs_baselines.hmm.bank import GaussianScores
 from hmcs_baselines.hmm.batch import baum_welch_many
 from hmcs_baselines.restarting import GestemeChains
 
-Array = NDArray[np.float64]
 
 
 class GestemeHmmSettings(NamedTuple):

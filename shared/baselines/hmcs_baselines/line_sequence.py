@@ -5,6 +5,8 @@ Shapes: K lines, D axes.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,7 +15,6 @@ from numpy.typing import NDArray
 
 from hmcs_baselines.chords import Chords, Fitted, Piece, lay, principal
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 

@@ -5,6 +5,8 @@ Shapes: T steps, F features of an observation, D symbols at a time of K kinds.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -23,7 +25,6 @@ from hmcs_baselines.symbols import (
     fit_codebook,
 )
 
-Array = NDArray[np.float64]
 
 Observed = Literal["od", "md", "fft", "fourier", "direction"]
 """OD: directions through a code book. MD: each component of the direction in bins. FFT: MD on the

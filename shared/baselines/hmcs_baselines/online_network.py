@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +26,6 @@ from hmcs_baselines.observing import ObservationSettings, Observed
 from hmcs_baselines.restarting import CusumSettings
 from hmcs_baselines.task_level import gesteme_shares
 
-Array = NDArray[np.float64]
 
 
 class OnlineNetworkSettings(NamedTuple):

@@ -6,6 +6,8 @@ Shapes: M gesteme HMMs of N states each, padded as in `GestemeChains`.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, Protocol
 
@@ -14,7 +16,6 @@ from numpy.typing import NDArray
 
 from hmcs_baselines.hmm.bank import ForwardBank
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Restart = Literal["given", "cusum", "network", "never"]

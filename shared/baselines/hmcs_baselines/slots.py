@@ -6,6 +6,8 @@ Shapes: S task states, M gestemes, K slots (a slot is one gesteme in one state),
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -21,7 +23,6 @@ from hmcs.recognition.task_chain import TaskChain
 from hmcs_baselines.hmm.bank import ForwardBank
 from hmcs_baselines.hmm.durations import dwell_transition, mean_dwells_s
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

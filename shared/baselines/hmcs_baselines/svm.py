@@ -7,6 +7,8 @@ Shapes: n samples, F features, K states, V support vectors of all machines.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmcs.errors import UserError
 
-Array = NDArray[np.float64]
 
 
 class SvmError(UserError):

@@ -8,6 +8,8 @@ Shapes: T directions, D axes, W windows, F features, K symbols.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -17,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from hmcs.errors import UserError
 from hmcs_baselines.clustering import assign, k_means
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 

@@ -5,6 +5,8 @@ Shapes: K slots (a slot is one gesteme in one task state), F dimensions, T steps
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -42,7 +44,6 @@ from hmcs_baselines.slots import (
     slot_rows,
 )
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

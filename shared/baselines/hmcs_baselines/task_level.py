@@ -5,6 +5,8 @@ Shapes: S task states, M gestemes, T steps.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple
@@ -23,7 +25,6 @@ from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.task_chain import TaskChain
 from hmcs_baselines.hmm.soft_evidence import learn_task
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

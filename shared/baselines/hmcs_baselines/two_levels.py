@@ -5,6 +5,8 @@ Shapes: M gestemes, S task states, T steps.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
@@ -39,7 +41,6 @@ from hmcs_baselines.task_level import (
     learn_task_level,
 )
 
-Array = NDArray[np.float64]
 
 Evidence = Literal["winner", "soft"]
 

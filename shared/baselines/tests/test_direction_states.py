@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -26,7 +28,6 @@ from hmcs_baselines.direction_states import (
 from hmcs_baselines.directions import DirectionError
 from hmcs_baselines.estimators import likelihoods
 
-Array = NDArray[np.float64]
 
 NOMINAL = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, -1.0, 0], [-0.6, 0, 0.8]])
 ORDER = (2, 0, 1, 3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import math
 
 import numpy as np
@@ -10,7 +12,6 @@ from numpy.typing import NDArray
 from hmcs.recognition.recognizer import Recognition, TaskBelief
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm
 
-Array = NDArray[np.float64]
 
 MEAN_STEPS = 20
 """The mean log-likelihood is taken over so many steps."""

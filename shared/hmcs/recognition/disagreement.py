@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from hmcs.motion.paths import resample
 from hmcs.motion.turns import mean_turns
-from hmcs.recognition.segments import Array, LearningError, Segment
+from hmcs.recognition.segments import LearningError, Segment
 from hmcs.task import Task
 
 POINTS = 32

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,7 +15,7 @@ from hmcs.motion.turns import mean_turns
 from hmcs.recognition.disagreement import turn_agreement
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import DEFAULT, TrainingData, kind_named
-from hmcs.recognition.segments import Array, LearningError, Segment, segments_of
+from hmcs.recognition.segments import LearningError, Segment, segments_of
 from hmcs.task import Task
 
 

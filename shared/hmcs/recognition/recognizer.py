@@ -6,6 +6,8 @@ here, so what runs over the bus is what runs in process.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import logging
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -15,7 +17,6 @@ from numpy.typing import NDArray
 
 from hmcs.motion.steps import Step
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 _log = logging.getLogger(__name__)

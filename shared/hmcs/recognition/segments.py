@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
@@ -14,7 +16,6 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import DeadZone, Step, steps_of_demonstration
 from hmcs.task import Task
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _LONGEST_LABEL = 64

@@ -8,6 +8,8 @@ Shapes: T steps, F dimensions.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -17,7 +19,6 @@ from numpy.typing import NDArray
 from hmcs.motion.quaternions import between
 from hmcs.motion.steps import Step
 
-Array = NDArray[np.float64]
 
 
 class Sensors(NamedTuple):

@@ -8,6 +8,8 @@ step of a known motion cannot spoil a window, since it counts as no worse than a
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 
 LEAST_KNOWN = 1e-6
 """P(part of the task) is held to be no less than this."""

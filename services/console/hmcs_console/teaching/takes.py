@@ -5,6 +5,8 @@ Times are s since the recording's first message, as its outline has them.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
@@ -26,7 +28,6 @@ from hmcs.recordings.stretches import (
 from hmcs_console.drawing.palette import UNKNOWN, Color, color_of
 from hmcs_console.drawing.pieces import Pieces
 
-Array = NDArray[np.float64]
 
 CHOSEN: Color = (60, 60, 60)
 MOST = 1e7

@@ -5,6 +5,8 @@ They are the very objects that the services run, driven by a clock of their own.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +27,6 @@ from hmcs.recognition.registry import recognizer_of
 from hmcs_laboratory.assistance.robots import SimulatedRobot, robot_of
 from hmcs_laboratory.assistance.scenarios import Scenario, Taught
 
-Array = NDArray[np.float64]
 
 
 class Run(NamedTuple):

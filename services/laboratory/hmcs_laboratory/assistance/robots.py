@@ -8,6 +8,8 @@ A distribution that simulates a robot in process names it in its `pyproject.toml
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from importlib.metadata import entry_points
 from typing import Protocol
 
@@ -18,7 +20,6 @@ from hmcs.errors import UserError
 from hmcs.task import Task
 from hmcs.task.model import unknown
 
-Array = NDArray[np.float64]
 
 ENTRY_POINTS = "hmcs.simulated_robots"
 LAG = "lag"

@@ -6,6 +6,8 @@ else.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,7 +22,6 @@ from hmcs.motion.operators import joined
 from hmcs.motion.paths import Path, resample
 from hmcs.task import Obstacle, Task, Workspace, find_task, load_task
 
-Array = NDArray[np.float64]
 
 _SAMPLE_M = 0.002
 LENGTHS = (0.7, 1.3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from functools import cache
 
@@ -11,7 +13,6 @@ from numpy.typing import NDArray
 from hmcs.motion.lasa import drawings, shapes
 from hmcs_laboratory.data.gestemes import GestemeSet
 
-Array = NDArray[np.float64]
 
 
 def equal_steps(positions: Array, step_m: float) -> Array:

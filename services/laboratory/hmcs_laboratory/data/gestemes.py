@@ -5,6 +5,8 @@ Each sample that the simulated hand makes is a step.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,7 +17,6 @@ from hmcs.motion.operators import Operator
 from hmcs.motion.references import References, random_gestemes
 from hmcs_laboratory.data.hands import moved
 
-Array = NDArray[np.float64]
 
 
 class GestemeSet(NamedTuple):

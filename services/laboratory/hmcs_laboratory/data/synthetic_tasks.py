@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -15,7 +17,6 @@ from hmcs.recognition.segments import LearningError, segments_of
 from hmcs_laboratory.data.hands import Count, CurveSettings, Positive, moved
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task
 
-Array = NDArray[np.float64]
 
 FIVE_STATES = ("l1", "c1", "l2", "c1", "l3")
 """Gestemes of the states of fig. 4.11: one arc serves two of them."""

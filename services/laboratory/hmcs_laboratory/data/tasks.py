@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -13,7 +15,6 @@ from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.scoring import NONE, midway_labels
 from hmcs.task import Task
 
-Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,7 +13,6 @@ from numpy.typing import NDArray
 from hmcs.motion.lasa import drawings, shapes
 from hmcs.motion.steps import Step
 
-Array = NDArray[np.float64]
 
 _SEVERAL = "Multi_Models"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
@@ -38,7 +40,6 @@ from hmcs_laboratory.figures.drawing import (
 )
 from hmcs_laboratory.study import StudySettings, stream_of
 
-Array = NDArray[np.float64]
 
 _NAMES = {
     "hmcs-segment-filter": "segment filter",

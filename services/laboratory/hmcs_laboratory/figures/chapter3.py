@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from itertools import combinations, groupby, pairwise
 from typing import Annotated, Any, NamedTuple
@@ -46,7 +48,6 @@ from hmcs_laboratory.figures.drawing import (
 from hmcs_laboratory.figures.drawn import DRAWINGS, turned
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SURE = 0.95

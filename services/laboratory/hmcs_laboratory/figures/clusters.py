@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -32,7 +34,6 @@ from hmcs_laboratory.figures.drawing import (
 )
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 
 
 class DirectionsSettings(StudySettings):

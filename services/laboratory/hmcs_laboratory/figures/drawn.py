@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -17,7 +19,6 @@ from hmcs_laboratory.data.synthetic_tasks import TRAINED_ORDER, UNSEEN_ORDER
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 Strokes = Annotated[int, Field(ge=1, le=6)]
 
 DRAWINGS = 7

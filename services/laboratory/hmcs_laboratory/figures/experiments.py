@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +45,6 @@ from hmcs_laboratory.figures.drawing import (
 )
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 
 _PERIOD_S = 0.01
 _MOST_S = 120.0

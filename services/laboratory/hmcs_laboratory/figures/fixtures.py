@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable
 from typing import Any
 
@@ -34,7 +36,6 @@ from hmcs_laboratory.figures.drawing import (
 )
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 
 SPEED_M_S = 0.1
 _MM = 1e3

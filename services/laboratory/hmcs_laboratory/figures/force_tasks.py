@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,6 @@ from hmcs_laboratory.studies.assistance import Lesson, LoopSettings, performed
 from hmcs_laboratory.studies.force_tasks import FREE, ForceTaskSettings, recognized
 from hmcs_laboratory.study import seed_from
 
-Array = NDArray[np.float64]
 
 
 def trajectories_of_force_tasks(settings: ForceTaskSettings, rng: np.random.Generator) -> Drawn:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -41,7 +43,6 @@ from hmcs_laboratory.figures.drawn import DrawnOrderSettings, drawn_orders
 from hmcs_laboratory.figures.trajectories import TaskFigureSettings
 from hmcs_laboratory.study import StudySettings
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _LOWEST_NATS = -60.0

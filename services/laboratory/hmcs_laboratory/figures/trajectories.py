@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -27,7 +29,6 @@ from hmcs_laboratory.figures.drawing import (
     new_picture,
 )
 
-Array = NDArray[np.float64]
 
 
 class TrajectorySettings(CurveSettings):

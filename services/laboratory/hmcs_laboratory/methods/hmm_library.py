@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +17,6 @@ from hmcs_laboratory.methods.features import directions, flat
 from hmcs_laboratory.methods.libraries import peer
 from hmcs_laboratory.methods.whole import Examples
 
-Array = NDArray[np.float64]
 
 STATES = 5
 ITERATIONS = 20

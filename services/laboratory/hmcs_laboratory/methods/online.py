@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +17,6 @@ from hmcs.recognition.scoring import pooled, score
 from hmcs.task import Task
 from hmcs_laboratory.data.tasks import Performance, TaskSet
 
-Array = NDArray[np.float64]
 Fresh = Callable[[], Recognizer]
 """Returns a recognizer that has learned and has seen no step yet."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,7 +27,6 @@ from hmcs_laboratory.methods.features import directions
 from hmcs_laboratory.methods.online import Fresh
 from hmcs_laboratory.methods.windows import FROM_START, LONG, Window, fit_window_trees
 
-Array = NDArray[np.float64]
 
 PHASES = 5
 VARIANCE_FLOOR = 0.01

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import warnings
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +16,6 @@ from hmcs_laboratory.methods.features import evenly, flat, labels
 from hmcs_laboratory.methods.libraries import peer
 from hmcs_laboratory.methods.whole import Examples
 
-Array = NDArray[np.float64]
 
 LEAST_SAMPLES = 9
 """MiniRocket takes no series shorter than this."""

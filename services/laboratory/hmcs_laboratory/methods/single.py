@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +13,6 @@ from hmcs_laboratory.methods.whole import Examples
 from hmcs_laboratory.single_gestemes.learning import learn_single
 from hmcs_laboratory.single_gestemes.model import SingleGestemes, scores
 
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ Shapes: M gestemes of N states; T observations of D symbols at a time, of K kind
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,7 +33,6 @@ from hmcs_baselines.symbols import (
 from hmcs_laboratory.methods.features import directions, flat
 from hmcs_laboratory.methods.whole import Examples, WholeMethod
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 Observed = Literal["od", "md", "fft"]

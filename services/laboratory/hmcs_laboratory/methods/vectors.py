@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +18,6 @@ from hmcs_laboratory.methods.features import flat, labels, shape_and_length
 from hmcs_laboratory.methods.whole import Examples, TooFewError
 from hmcs_laboratory.methods.windows import FROM_START, fit_window_trees, log_shares
 
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

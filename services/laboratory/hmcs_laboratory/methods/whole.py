@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +14,6 @@ from numpy.typing import NDArray
 
 from hmcs_laboratory.data.gestemes import GestemeSet
 
-Array = NDArray[np.float64]
 Examples = Sequence[Sequence[Array]]
 """Of each of G gestemes performances to learn from: positions, m, shape (T, D)."""
 

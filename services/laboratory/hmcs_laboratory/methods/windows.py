@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +12,6 @@ from sklearn.ensemble import ExtraTreesClassifier
 
 from hmcs_laboratory.methods.features import directions
 
-Array = NDArray[np.float64]
 
 TREES = 100
 LEAST_SHARE = 1e-3

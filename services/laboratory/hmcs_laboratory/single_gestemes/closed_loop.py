@@ -22,6 +22,8 @@ compared with it, K nodes looked at around the phase. Lengths have the unit of t
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -31,7 +33,6 @@ from numpy.typing import NDArray
 from hmcs.recognition.segment_filter.exits import exit_features, exit_probability
 from hmcs_laboratory.single_gestemes.projected_normal import log_density
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 NODES_LOOKED_AT = 10

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 
 
 def evenly(positions: Array, count: int) -> Array:

@@ -5,6 +5,8 @@ Shapes as there; n examples altogether.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable, Sequence
 from itertools import product
 from typing import NamedTuple
@@ -31,7 +33,6 @@ from hmcs_laboratory.single_gestemes.shape_vectors import (
 )
 from hmcs_laboratory.single_gestemes.shrinkage import Discriminants, class_means, shared_covariance
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Motions = Sequence[Sequence[Array]]
 

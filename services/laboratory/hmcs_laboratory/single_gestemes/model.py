@@ -14,6 +14,8 @@ the unit of positions may be any, the same throughout.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -29,7 +31,6 @@ from hmcs_laboratory.single_gestemes.closed_loop import (
 from hmcs_laboratory.single_gestemes.shape_vectors import beginning_vector, whole_vector
 from hmcs_laboratory.single_gestemes.shrinkage import Discriminants
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 VOICES = 2

@@ -5,6 +5,8 @@ Shapes: D axes, n motions, C points evenly along a motion, its start left out.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,7 +16,6 @@ from numpy.typing import NDArray
 from hmcs_laboratory.single_gestemes.closed_loop import unit
 from hmcs_laboratory.single_gestemes.even_points import evenly, step_lengths
 
-Array = NDArray[np.float64]
 
 
 class HandSettings(NamedTuple):

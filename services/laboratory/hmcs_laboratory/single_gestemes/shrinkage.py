@@ -5,12 +5,13 @@ Shapes: n examples of V classes, F features.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _LEAST_SPREAD = 1e-9

@@ -6,11 +6,13 @@ is seen, unless it tells nothing, with probability o. Shapes: R steps, D axes.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
 
-from hmcs_laboratory.single_gestemes.closed_loop import Array, direction_densities
+from hmcs_laboratory.single_gestemes.closed_loop import direction_densities
 from hmcs_laboratory.single_gestemes.projected_normal import lengths
 
 

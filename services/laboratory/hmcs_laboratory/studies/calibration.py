@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
@@ -19,7 +21,6 @@ from hmcs_laboratory.methods.online import Followed, Learned, OnlineMethod, foll
 from hmcs_laboratory.methods.registered import OnlineNames, online
 from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Data = Literal["five-states", "unseen-order", "fixed-order", "any-order"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -40,7 +42,6 @@ from hmcs_laboratory.data.synthetic_tasks import TaskSettings, line_task
 from hmcs_laboratory.data.tasks import Performance, TaskSet, as_performance, path_of, plain_task
 from hmcs_laboratory.study import Measured, Study, seed_from, stream_of
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 What = Literal["number", "following"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Literal, NamedTuple
@@ -32,7 +34,6 @@ from hmcs_laboratory.methods.online import Fresh
 from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm
 from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
 
-Array = NDArray[np.float64]
 
 Data = Literal["five-states", "drawings"]
 Motion = Literal["shapes", "smooth", "reaches"]

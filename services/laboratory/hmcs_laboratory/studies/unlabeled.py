@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -32,7 +34,6 @@ from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
 from hmcs_laboratory.data.tasks import path_of
 from hmcs_laboratory.study import Measured, Scalar, Study
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 Data = Literal["five-states", "drawings"]

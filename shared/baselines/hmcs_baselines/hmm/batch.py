@@ -7,6 +7,8 @@ most (fewer and shorter ones are padded); F dimensions, S symbols. Recursions ov
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -22,7 +24,7 @@ from hmcs.recognition.hmm.emissions import (
     Observations,
     check_spread,
 )
-from hmcs.recognition.hmm.inference import Array, log_likelihood, smooth
+from hmcs.recognition.hmm.inference import log_likelihood, smooth
 from hmcs.recognition.hmm.learning import ALL, Learned, Parts, checked_sequences, renormalized
 from hmcs.recognition.hmm.model import Hmm, naming_the_observation
 from hmcs_baselines.hmm.stacked import (

@@ -11,6 +11,8 @@ Shapes: C children of an internal state, L production states in depth-first orde
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
@@ -19,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.model import E, Hmm
-from hmcs_baselines.hmm.markov import Array, checked_rows
+from hmcs_baselines.hmm.markov import checked_rows
 
 NodePath = tuple[str, ...]
 """The names from the root to a state of the tree."""

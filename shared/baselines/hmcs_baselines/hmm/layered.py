@@ -11,6 +11,8 @@ Shapes: K models in a layer, N states in the largest of them, M classes of the l
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +22,7 @@ import numpy as np
 
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.emissions import Discrete, Emission, Observations
-from hmcs.recognition.hmm.inference import Array, ImpossibleSequenceError
+from hmcs.recognition.hmm.inference import ImpossibleSequenceError
 from hmcs.recognition.hmm.model import Hmm, validate
 from hmcs_baselines.hmm.markov import checked_rows
 from hmcs_baselines.hmm.soft_evidence import SoftSymbols

@@ -5,6 +5,8 @@ Shapes: N states, T steps. States are indices 0..N−1.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hmcs.errors import UserError
 
-Array = NDArray[np.float64]
 States = NDArray[np.int64]
 
 SUM_TOLERANCE = 1e-9

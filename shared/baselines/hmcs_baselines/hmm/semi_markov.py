@@ -12,6 +12,8 @@ long).
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,7 +23,7 @@ from numpy.typing import ArrayLike
 from hmcs.recognition.hmm.inference import ImpossibleSequenceError
 from hmcs.recognition.hmm.log_transitions import log_of
 from hmcs_baselines.hmm.durations import DurationError
-from hmcs_baselines.hmm.markov import Array, States, checked_rows
+from hmcs_baselines.hmm.markov import States, checked_rows
 
 
 class DurationHmm(NamedTuple):

@@ -6,6 +6,8 @@ Shapes: N states, T steps.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hmcs.recognition.hmm.emissions import Discrete, ObservationError, Observations
-from hmcs.recognition.hmm.inference import Array
 from hmcs.recognition.hmm.learning import CHAIN, baum_welch
 from hmcs.recognition.hmm.model import Hmm
 from hmcs_baselines.hmm.markov import checked_states

@@ -6,6 +6,8 @@ side), F dimensions, S symbols.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
@@ -14,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, ModelError, floored
-from hmcs.recognition.hmm.inference import Array
 
 Mask = NDArray[np.bool_]
 Integers = NDArray[np.int64]

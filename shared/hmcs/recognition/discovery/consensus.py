@@ -8,6 +8,8 @@ Shapes: T_d steps of performance d, N points of the mean.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,7 +18,6 @@ from numpy.typing import NDArray
 
 from hmcs.recognition.discovery.curve_pieces import axes_filled
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _ITERATIONS = 4

@@ -9,12 +9,13 @@ Shapes: N points of the path, P stretches.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _TURNS_RAD = np.geomspace(0.015, 0.6, 48)

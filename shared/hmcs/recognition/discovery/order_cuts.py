@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -14,7 +16,6 @@ from hmcs.recognition.discovery.curve_pieces import Stretches, cut, fitted, para
 from hmcs.recognition.discovery.stops import stops
 from hmcs.recognition.discovery.unlabeled_motions import Stepped, rising
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _WINDOW_STEPS = 12

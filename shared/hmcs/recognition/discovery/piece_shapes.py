@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -11,7 +13,6 @@ from numpy.typing import NDArray
 
 from hmcs.motion.paths import resample
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _POINTS = 24

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,7 +12,6 @@ from numpy.typing import NDArray
 
 from hmcs.recognition.discovery.consensus import Consensus
 
-Array = NDArray[np.float64]
 
 _SLACK_STEPS = 3
 """Aligned by its shape alone, a performance passes a point of the path so many steps too early or

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

@@ -11,6 +11,8 @@ Shapes: T samples of a demonstration, G gestemes, S states.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -32,7 +34,6 @@ from hmcs.recognition.discovery.unlabeled_motions import (
 from hmcs.recognition.segments import LearningError
 from hmcs.task import Task
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

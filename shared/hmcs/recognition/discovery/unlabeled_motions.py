@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,7 +15,6 @@ from hmcs.recognition.discovery.consensus import equal_steps
 from hmcs.recognition.discovery.stops import dwells
 from hmcs.recognition.segments import LearningError
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

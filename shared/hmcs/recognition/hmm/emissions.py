@@ -10,6 +10,8 @@ Shapes: N states, T observations, F dimensions of continuous observations, M sym
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -18,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recognition.hmm.densities import Gaussian, Mixture, check_spread, log_gaussians
-from hmcs.recognition.hmm.inference import Array
 from hmcs.recognition.hmm.observations import (
     DrawingEmission,
     Emission,

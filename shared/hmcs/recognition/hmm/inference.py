@@ -7,6 +7,8 @@ sum to less than one: what is missing is the probability of leaving the model. A
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +17,6 @@ from numpy.typing import NDArray
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.log_transitions import LogTransitions, log_of, log_sum
 
-Array = NDArray[np.float64]
 Path = NDArray[np.int64]
 
 LOST = 1e-300

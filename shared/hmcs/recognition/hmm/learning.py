@@ -8,19 +8,15 @@ probability of leaving) stays too.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Generic, NamedTuple
 
 import numpy as np
 
 from hmcs.recognition.hmm.emissions import ModelError, ObservationError, Observations
-from hmcs.recognition.hmm.inference import (
-    Array,
-    Smoothed,
-    log_likelihood,
-    shortest_path,
-    smooth,
-)
+from hmcs.recognition.hmm.inference import Smoothed, log_likelihood, shortest_path, smooth
 from hmcs.recognition.hmm.model import (
     E,
     Hmm,

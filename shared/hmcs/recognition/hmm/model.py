@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Generic, NamedTuple, TypeVar
@@ -17,13 +19,7 @@ from hmcs.recognition.hmm.emissions import (
     Observations,
     draw,
 )
-from hmcs.recognition.hmm.inference import (
-    Array,
-    Decoded,
-    ImpossibleSequenceError,
-    Path,
-    Smoothed,
-)
+from hmcs.recognition.hmm.inference import Decoded, ImpossibleSequenceError, Path, Smoothed
 
 E = TypeVar("E", bound=Emission)
 D = TypeVar("D", bound=DrawingEmission)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Any, Protocol, Self
 
@@ -9,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.errors import UserError
-from hmcs.recognition.hmm.inference import Array
 
 Observations = NDArray[Any]
 """One sequence; its first axis is time."""

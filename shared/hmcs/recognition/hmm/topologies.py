@@ -6,10 +6,11 @@ initial distributions (N,).
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 import numpy as np
 
 from hmcs.errors import UserError
-from hmcs.recognition.hmm.inference import Array
 
 
 class TopologyError(UserError, ValueError):

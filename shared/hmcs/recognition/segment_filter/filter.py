@@ -14,6 +14,8 @@ Shapes: S states, K slots (a slot is one gesteme in one state), h living hypothe
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +24,6 @@ from numpy.typing import NDArray
 from hmcs.recognition.recognizer import StepEvidence, TaskBelief
 from hmcs.recognition.task_chain import TaskChain
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 

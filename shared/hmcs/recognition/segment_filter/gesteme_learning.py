@@ -8,6 +8,8 @@ which no agreement between demonstrations is believed.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -31,7 +33,6 @@ from hmcs.recognition.segment_filter.senses import (
 from hmcs.recognition.segment_filter.variants import VariantSettings, split_into_variants
 from hmcs.recognition.segments import Segment
 
-Array = NDArray[np.float64]
 
 
 class LearningSettings(NamedTuple):

@@ -10,6 +10,8 @@ phases), D axes looked at, F = 2·D observed dimensions, p living pairs.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -24,7 +26,6 @@ from hmcs.recognition.segment_filter.exits import exit_features, exit_probabilit
 from hmcs.recognition.segment_filter.senses import Senses, log_densities
 from hmcs.recognition.sensors import SensorReader
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 LONGEST_WINDOW_STEPS = 1_999

@@ -5,6 +5,8 @@ What is a threshold is taken from demonstrations that the models at hand were no
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -29,7 +31,6 @@ from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import fit_of, learn_alarm
 from hmcs.task import Task
 
-Array = NDArray[np.float64]
 
 
 def learn_layers(

@@ -6,6 +6,8 @@ runs in process.
 
 from __future__ import annotations
 
+from hmcs.arrays import Array
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -16,7 +18,7 @@ from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition, StepEvidence
 from hmcs.recognition.segment_filter.filter import FilterSettings, SegmentFilter
-from hmcs.recognition.segment_filter.gestemes import Array, GestemeBank, GestemeParameters, Scoring
+from hmcs.recognition.segment_filter.gestemes import GestemeBank, GestemeParameters, Scoring
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm
 
