@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -11,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from bench.figures import Figure
 from hmcs.fixtures.compliance.trust import SegmentBelief
@@ -22,7 +19,6 @@ from hmcs.fixtures.regions.forbidden import Region
 from hmcs.fixtures.regions.meshes import Mesh
 from hmcs.motion.paths import Path
 from hmcs.task import load_task
-
 
 TICK_US = 100.0
 CLOSEST_US = 50.0

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from hmmlearn.hmm import GaussianHMM
-from numpy.typing import NDArray
 
 from bench.figures import Figure, tell
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.model import Hmm, sample
 from hmcs.recognition.hmm.topologies import fully_connected, left_right, start_anywhere, start_in
 from hmcs_baselines.hmm.bank import ForwardBank, GaussianScores
 from hmcs_baselines.hmm.batch import baum_welch_many
-
 
 LEARNING_RATIO = 5.0
 SAME_LIKELIHOOD = 1e-6

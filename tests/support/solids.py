@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import nearest_pairs, normals_of
 from hmcs.fixtures.regions.meshes import Mesh
 from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape
 from hmcs.motion.quaternions import unit_quaternion
-
 
 TOOLS = {
     "point": ToolShape.ball(0.0),

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.quaternions import product, rotation_matrix
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.sources import DeviceSample, SeesRobot, Source
-
-FloatArray = NDArray[np.float64]
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 """No turn."""
@@ -43,7 +41,7 @@ class TaskFrame:
             else (self._rotation @ sample.wrench.reshape(2, 3).T).T.ravel(),
         )
 
-    def _turned(self, vector: FloatArray | None) -> FloatArray | None:
+    def _turned(self, vector: Array | None) -> Array | None:
         return None if vector is None else self._rotation @ vector
 
 

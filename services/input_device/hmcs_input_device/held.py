@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.bus.messages import Handle
 from hmcs.task import Task
 from hmcs_input_device.press_gate import SILENT_S, PressGate
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.sources import FARTHEST_M, LIVE, DeviceSample
-
-FloatArray = NDArray[np.float64]
 
 RATE_HZ = 100.0
 FOLLOW_S = 0.08
@@ -42,7 +40,7 @@ class HeldHandle:
         self._let_go = False
         self._fault = ""
         self._hand = np.zeros(3)
-        self._offset: FloatArray | None = None
+        self._offset: Array | None = None
         self._sampled_s: float | None = None
         self._elapsed_s = 0.0
         self.refusal = ""

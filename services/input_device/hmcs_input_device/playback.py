@@ -6,13 +6,11 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.quaternions import continuous
 from hmcs_input_device.sources import LIVE, DeviceSample
-
-FloatArray = NDArray[np.float64]
 
 LEAST_RATE_HZ = 30.0
 MOST_RATE_HZ = 1000.0
@@ -114,13 +112,13 @@ class Playback:
             wrench=None if self._wrenches is None else np.zeros(6),
         )
 
-    def _at(self, moving_s: float, recorded: FloatArray) -> FloatArray:
+    def _at(self, moving_s: float, recorded: Array) -> Array:
         behind = min(bisect_right(self._times_s, moving_s), len(self._times_s) - 1) - 1
         begin_s, end_s = self._times_s[behind : behind + 2]
         share = min((moving_s - begin_s) / (end_s - begin_s), 1.0)
         return np.asarray((1.0 - share) * recorded[behind] + share * recorded[behind + 1])
 
-    def _orientation(self, moving_s: float) -> FloatArray | None:
+    def _orientation(self, moving_s: float) -> Array | None:
         if self._orientations is None:
             return None
         between = self._at(moving_s, self._orientations)
@@ -131,7 +129,7 @@ class Playback:
         newest = bisect_right(self._pressed_s, round(moving_s, 9)) - 1
         return newest >= 0 and moving_s < self._released_s[newest]
 
-    def _velocity(self, moving_s: float) -> FloatArray:
+    def _velocity(self, moving_s: float) -> Array:
         window_s = self._passes.velocity_window_s
         before_s = max(moving_s - window_s, 0.0)
         after_s = min(moving_s + window_s, self._times_s[-1])

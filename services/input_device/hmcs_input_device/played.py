@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.closed_loop_operators import PRESETS, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration, read_csv
@@ -25,8 +25,6 @@ from hmcs_input_device.reaction import Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.simulated import Simulated
 from hmcs_input_device.sources import SourceFactory
-
-FloatArray = NDArray[np.float64]
 
 _SIMULATED_RATE_HZ = 100.0
 _SPACING_M = 0.002
@@ -157,9 +155,7 @@ def _segments(
     return segments
 
 
-def _random_gesteme(
-    settings: InputDeviceSettings, task: Task, rng: np.random.Generator
-) -> FloatArray:
+def _random_gesteme(settings: InputDeviceSettings, task: Task, rng: np.random.Generator) -> Array:
     axes = [AXES[axis] for axis in task.recognition.axes]
     references = References(kind=settings.primitives, dimensions=max(2, len(axes)))
     points = random_gesteme(references.scaled(settings.primitive_scale), rng)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.leading import LeadingHand
 from hmcs_input_device.reaction import HEARD_WITHIN_S, Reaction
 from hmcs_input_device.sources import LIVE, DeviceSample
-
-FloatArray = NDArray[np.float64]
 
 MOST_BEHIND = 10
 """A process that hung makes up for so many samples at most; the operator waited meanwhile."""
@@ -42,7 +40,7 @@ class Simulated:
         """
         self._operator = operator
         self._lead_in_s = lead_in_s
-        self._robot: tuple[FloatArray, FloatArray] | None = None
+        self._robot: tuple[Array, Array] | None = None
         self._seen_anew = False
         self._seen_s = 0.0
         self._leading = leading
@@ -58,7 +56,7 @@ class Simulated:
         """When it arrived; LIVE until then."""
         return LIVE if self._ended_s is None else self._ended_s
 
-    def sees(self, position: FloatArray, orientation: FloatArray) -> None:
+    def sees(self, position: Array, orientation: Array) -> None:
         """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
         self._robot, self._seen_anew = (position, orientation), True
         if self._leading is not None:

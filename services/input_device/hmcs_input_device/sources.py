@@ -18,14 +18,12 @@ from importlib.metadata import entry_points
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.bus.messages import Handle
 from hmcs.errors import UserError
 from hmcs.task import Task
 from hmcs_input_device.settings import InputDeviceSettings
-
-FloatArray = NDArray[np.float64]
 
 ENTRY_POINTS = "hmcs.input_sources"
 """Group of the entry points that name sources."""
@@ -40,18 +38,18 @@ FASTEST_M_S = 5.0
 class DeviceSample(NamedTuple):
     """The operator's device at one moment; positions in the operator frame, see `Motion`."""
 
-    position: FloatArray
+    position: Array
     """m, shape (3,)."""
-    velocity: FloatArray
+    velocity: Array
     """m/s, shape (3,)."""
     dead_man: bool
     clutch: bool = False
     pedal: bool = False
-    orientation: FloatArray | None = None
+    orientation: Array | None = None
     """x y z w, shape (4,)."""
-    angular_velocity: FloatArray | None = None
+    angular_velocity: Array | None = None
     """rad/s, shape (3,)."""
-    wrench: FloatArray | None = None
+    wrench: Array | None = None
     """N and N·m, shape (6,)."""
     age_s: float | None = None
     """How long ago the device reported this; None where the source cannot know. A device whose
@@ -103,7 +101,7 @@ class Source(Protocol):
 class SeesRobot(Protocol):
     """A source whose operator looks at the robot."""
 
-    def sees(self, position: FloatArray, orientation: FloatArray) -> None:
+    def sees(self, position: Array, orientation: Array) -> None:
         """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
 
 

@@ -7,12 +7,12 @@ left is that none of the classes is true.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from hmcs.arrays import Array
 
 Integers = NDArray[np.int64]
 

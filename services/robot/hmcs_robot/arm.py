@@ -6,13 +6,12 @@ no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from itertools import combinations
 
 import numpy as np
 import pybullet
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
 from hmcs_robot.driver import JointLimits, Pose

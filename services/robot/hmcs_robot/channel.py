@@ -6,8 +6,6 @@ nobody reads. Towards control only small, already validated orders go; back come
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import hashlib
 import socket
 import struct
@@ -17,6 +15,7 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs_robot.supervision import Order, Stop
 
 LARGEST_BYTES = 65_536

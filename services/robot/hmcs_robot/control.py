@@ -10,13 +10,12 @@ where it came to rest.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.motion import quaternions

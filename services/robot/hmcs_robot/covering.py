@@ -7,14 +7,13 @@ for, however fine the mesh is. Halved where most of them is empty, they lie alon
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import heapq
 from itertools import count
 from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.clusters import principal_boxes
 from hmcs.fixtures.regions.surfaces import area_vectors
 

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hmcs.arrays import Array
 from hmcs_robot.looks import Looks
-
 
 
 class Pose(NamedTuple):

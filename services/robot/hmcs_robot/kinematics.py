@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
 from hmcs_robot.driver import JointLimits, Pose

@@ -6,13 +6,12 @@ velocities come last, are linear, and always admit standing still.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.fixtures.regions.keep_out import KeepOut

@@ -5,10 +5,9 @@ For studies, which run at many times real speed: the very control and physics of
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.task import Task
 from hmcs_robot.control import Motion, Standing, follow
 from hmcs_robot.set_up import limits_of, simulated, tuning_of

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 import pybullet
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm

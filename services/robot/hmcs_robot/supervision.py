@@ -14,13 +14,12 @@ stamped on arrival only now and looks fresh without being so; hence commands are
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from hmcs.arrays import Array
 
 Stop = Literal[
     "none",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -12,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hmcs.arrays import Array
 from hmcs.fixtures.regions.forbidden import Plane, Region, sphere
 from hmcs.fixtures.regions.tool_shape import ToolShape
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired

@@ -16,14 +16,13 @@ Each limit is taken from the task or from what hands can do:
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step, steps_of
 from hmcs.task import Task
@@ -42,7 +41,6 @@ REGULAR_SHARE = 0.95
 """Samples come regularly where so many intervals are no longer than twice the usual one; a file of
 corners, written by hand, has no gaps."""
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "inches": 0.0254}
-
 
 
 class Finding(NamedTuple):

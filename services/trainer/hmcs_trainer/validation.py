@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.disagreement import check_agreement, turn_agreement
 from hmcs.recognition.segment_filter.gestemes import LONGEST_WINDOW_STEPS

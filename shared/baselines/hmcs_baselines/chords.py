@@ -16,14 +16,14 @@ Shapes: T points, D axes, F = D(D+1)/2 entries of a symmetric matrix, K directio
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmcs.arrays import Array
 
 Integers = NDArray[np.intp]
 

@@ -6,13 +6,12 @@ Shapes: M points, D axes, k clusters.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 
 Integers = NDArray[np.intp]

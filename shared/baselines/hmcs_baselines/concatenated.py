@@ -8,8 +8,6 @@ states, M gestemes, F dimensions, T steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -17,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import LEAST_SPREAD, check_shapes, check_spreads, check_within
 from hmcs.recognition.hmm.inference import shortest_path

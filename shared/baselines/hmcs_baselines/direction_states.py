@@ -7,14 +7,13 @@ Shapes: T steps, D axes, K directions.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.checking import (
     LEAST_SPREAD,
     check_distributions,

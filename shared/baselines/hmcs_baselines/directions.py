@@ -12,8 +12,6 @@ Shapes: T_i points of demonstration i, D axes, K directions.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.segments import LearningError
 from hmcs_baselines.chords import Chords, Piece, cut, median_spread
 from hmcs_baselines.clustering import assign

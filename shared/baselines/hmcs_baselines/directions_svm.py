@@ -5,14 +5,12 @@ Shapes: K slots (a slot is one gesteme in one task state), N directions, T steps
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import (
     LEAST_SPREAD,
@@ -41,7 +39,6 @@ from hmcs_baselines.slots import (
     learn_slot_chain,
     slot_index,
 )
-
 
 
 class DirectionTaskSettings(NamedTuple):

@@ -6,15 +6,13 @@ Shapes: K is the most clusters searched; entry i of an array over k belongs to k
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs_baselines.clustering import ClusteringError, Clusters, k_means
-
 
 
 class ClusterSearch(NamedTuple):

@@ -6,13 +6,12 @@ Shapes: T observations x of F dimensions, K classes.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.checking import (
     LARGEST,
     LEAST_SPREAD,

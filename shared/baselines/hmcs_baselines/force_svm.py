@@ -7,14 +7,13 @@ Shapes: M categories, K slots (a slot is one gesteme in one task state), F compo
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, check_within
 from hmcs.recognition.model import Model, axes_of

@@ -6,14 +6,13 @@ F dimensions.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.checking import (
     LARGEST,
     LEAST_SPREAD,
@@ -29,7 +28,6 @@ from hmcs.recognition.hmm.topologies import left_right, start_in
 from hmcs_baselines.hmm.bank import GaussianScores
 from hmcs_baselines.hmm.batch import baum_welch_many
 from hmcs_baselines.restarting import GestemeChains
-
 
 
 class GestemeHmmSettings(NamedTuple):

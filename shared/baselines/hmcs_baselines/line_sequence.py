@@ -5,14 +5,13 @@ Shapes: K lines, D axes.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_baselines.chords import Chords, Fitted, Piece, lay, principal
 
 Integers = NDArray[np.intp]

@@ -5,14 +5,13 @@ Shapes: T steps, F features of an observation, D symbols at a time of K kinds.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, check_within
 from hmcs_baselines.symbols import (
@@ -24,7 +23,6 @@ from hmcs_baselines.symbols import (
     fit_bins,
     fit_codebook,
 )
-
 
 Observed = Literal["od", "md", "fft", "fourier", "direction"]
 """OD: directions through a code book. MD: each component of the direction in bins. FFT: MD on the

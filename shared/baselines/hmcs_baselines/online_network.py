@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.model import Model
@@ -25,7 +23,6 @@ from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
 from hmcs_baselines.observing import ObservationSettings, Observed
 from hmcs_baselines.restarting import CusumSettings
 from hmcs_baselines.task_level import gesteme_shares
-
 
 
 class OnlineNetworkSettings(NamedTuple):

@@ -6,14 +6,13 @@ Shapes: M gesteme HMMs of N states each, padded as in `GestemeChains`.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_baselines.hmm.bank import ForwardBank
 
 Integers = NDArray[np.int64]

@@ -6,14 +6,13 @@ Shapes: S task states, M gestemes, K slots (a slot is one gesteme in one state),
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import check_distributions, check_shapes
 from hmcs.recognition.hmm.inference import shortest_path

@@ -7,15 +7,13 @@ Shapes: n samples, F features, K states, V support vectors of all machines.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
-
 
 
 class SvmError(UserError):

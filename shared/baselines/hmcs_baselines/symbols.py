@@ -8,14 +8,13 @@ Shapes: T directions, D axes, W windows, F features, K symbols.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs_baselines.clustering import assign, k_means
 

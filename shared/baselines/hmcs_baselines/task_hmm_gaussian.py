@@ -5,14 +5,13 @@ Shapes: K slots (a slot is one gesteme in one task state), F dimensions, T steps
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import (
     LARGEST,

@@ -5,8 +5,6 @@ Shapes: S task states, M gestemes, T steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple
@@ -14,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.checking import (
     LEAST_SPREAD,
     check_distributions,

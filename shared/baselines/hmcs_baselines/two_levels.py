@@ -5,14 +5,12 @@ Shapes: M gestemes, S task states, T steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import LARGEST, check_within
@@ -40,7 +38,6 @@ from hmcs_baselines.task_level import (
     gesteme_shares,
     learn_task_level,
 )
-
 
 Evidence = Literal["winner", "soft"]
 

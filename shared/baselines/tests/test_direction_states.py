@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -12,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.operators import Operator, follow, joined
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.topologies import fully_connected
@@ -27,7 +26,6 @@ from hmcs_baselines.direction_states import (
 )
 from hmcs_baselines.directions import DirectionError
 from hmcs_baselines.estimators import likelihoods
-
 
 NOMINAL = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, -1.0, 0], [-0.6, 0, 0.8]])
 ORDER = (2, 0, 1, 3)

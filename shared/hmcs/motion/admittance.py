@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.dead_band import beyond
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Admittance:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} is {getattr(self, name)}, expected more than 0")
 
-    def twist(self, wrench: FloatArray) -> FloatArray:
+    def twist(self, wrench: Array) -> Array:
         """Return the velocity, m/s and rad/s, that a force and torque ask for, shapes (6,)."""
         return np.concatenate(
             [
@@ -43,7 +41,7 @@ class Admittance:
             ]
         )
 
-    def wrench(self, twist: FloatArray) -> FloatArray:
+    def wrench(self, twist: Array) -> Array:
         """Return the force, N, and torque, N·m, that ask for a velocity, shapes (6,)."""
         return np.concatenate(
             [
@@ -53,6 +51,6 @@ class Admittance:
         )
 
 
-def _raised(vector: FloatArray, threshold: float) -> FloatArray:
+def _raised(vector: Array, threshold: float) -> Array:
     length = float(np.linalg.norm(vector))
     return np.asarray(vector * (1.0 + threshold / length)) if length > 0 else vector

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError
-
-FloatArray = NDArray[np.float64]
 
 
 def chained(name: str, demonstrations: Sequence[Demonstration], start: np.ndarray) -> Demonstration:
@@ -59,8 +57,8 @@ def closed(demonstration: Demonstration) -> Demonstration:
     return demonstration._replace(positions=positions + np.outer(moved / moved[-1], missing))
 
 
-def _in_turn(sense: str, demonstrations: Sequence[Demonstration]) -> FloatArray | None:
-    recorded: list[FloatArray | None] = [getattr(each, sense) for each in demonstrations]
+def _in_turn(sense: str, demonstrations: Sequence[Demonstration]) -> Array | None:
+    recorded: list[Array | None] = [getattr(each, sense) for each in demonstrations]
     there = [samples for samples in recorded if samples is not None]
     if not there:
         return None

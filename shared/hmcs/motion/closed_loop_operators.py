@@ -15,12 +15,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.disturbances import Tremor, Wander
 from hmcs.motion.paths import Path
-
-FloatArray = NDArray[np.float64]
 
 BEHIND_M, AHEAD_M = 0.005, 0.008
 """The robot is looked for so far behind and ahead of where it was."""
@@ -117,9 +115,9 @@ PRESETS: Mapping[str, Habits] = {
 class HandMotion(NamedTuple):
     """What the hand does in one period."""
 
-    velocity: FloatArray
+    velocity: Array
     """Of the hand, m/s, shape (3,)."""
-    intended: FloatArray
+    intended: Array
     """The same without what was not meant, m/s, shape (3,)."""
     progress_m: float
     """How far along the intended path the operator takes the robot to be."""
@@ -147,8 +145,8 @@ class ClosedLoopOperator:
         self._arrive_within_m = arrive_within_m
         self._slow_m, self._slow = _slowing(path)
         # In the order of seeing: what is seen now is the oldest of these.
-        self._seen: deque[FloatArray] = deque(maxlen=round(habits.delay_s / period_s) + 1)
-        self._told: deque[FloatArray] = deque(maxlen=round(habits.delay_s / period_s))
+        self._seen: deque[Array] = deque(maxlen=round(habits.delay_s / period_s) + 1)
+        self._told: deque[Array] = deque(maxlen=round(habits.delay_s / period_s))
         self._follow = 1.0 - float(np.exp(-period_s / habits.lag_s))
         self._intended = np.zeros(3)
         self._progress_m = 0.0
@@ -160,7 +158,7 @@ class ClosedLoopOperator:
         self._regrets = _regrets(habits, path, rng)
         self._back_to_m: float | None = None
 
-    def step(self, robot: FloatArray) -> HandMotion:
+    def step(self, robot: Array) -> HandMotion:
         """Look at the robot, m, shape (3,), and return the hand's motion in the next period."""
         self._seen.append(np.array(robot))
         path, habits = self._path, self._habits
@@ -195,7 +193,7 @@ class ClosedLoopOperator:
         )
         return HandMotion(velocity, self._intended, self._progress_m, arrived)
 
-    def _go_on(self, seen: FloatArray) -> float:
+    def _go_on(self, seen: Array) -> float:
         """Find the robot on the path; return how far off it is, m."""
         last_m = self._path.length_m
         reach = np.linspace(-BEHIND_M, AHEAD_M, PLACES)
@@ -240,7 +238,7 @@ class ClosedLoopOperator:
         return max(float(places[fits[-1]]), self._progress_m + self._habits.look_ahead_m)
 
 
-def _slowing(path: Path) -> tuple[FloatArray, FloatArray]:
+def _slowing(path: Path) -> tuple[Array, Array]:
     """Places along a path, m, and the share of full speed the two-thirds power law leaves there."""
     count = max(2, int(path.length_m / (0.5 * CURVATURE_REACH_M)) + 1)
     places = np.linspace(0.0, path.length_m, count)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.quaternions import is_unit
 from hmcs.plain_numbers import number_in, separator_in
@@ -25,7 +26,6 @@ from hmcs.plain_numbers import number_in, separator_in
 if TYPE_CHECKING:
     from _csv import Reader
 
-FloatArray = NDArray[np.float64]
 
 _TIME, _AXES, _STATE = "time_s", ("x_m", "y_m", "z_m"), "state"
 _QUATERNION = ("qx", "qy", "qz", "qw")
@@ -46,15 +46,15 @@ class Demonstration(NamedTuple):
 
     name: str
     """Where it came from, e.g. its file's name."""
-    time_s: FloatArray
+    time_s: Array
     """Shape (T,), rising."""
-    positions: FloatArray
+    positions: Array
     """m, shape (T, 3)."""
     states: tuple[str | None, ...]
     """The task state of each sample, T of them; None where it has no label."""
-    orientations: FloatArray | None = None
+    orientations: Array | None = None
     """Of the hand, unit quaternions x y z w, shape (T, 4); None where they were not recorded."""
-    wrenches: FloatArray | None = None
+    wrenches: Array | None = None
     """The operator's force, N, then torque, N·m, shape (T, 6); None where not recorded."""
 
     @property
@@ -112,7 +112,7 @@ def read_csv(path: str | Path) -> Demonstration:
     table = dict(zip(columns, np.array([row.numbers for row in rows]).T, strict=False))
     table.setdefault(_AXES[2], np.zeros(len(rows)))
 
-    def together(names: tuple[str, ...]) -> FloatArray:
+    def together(names: tuple[str, ...]) -> Array:
         return np.stack([table[name] for name in names], axis=1)
 
     return Demonstration(

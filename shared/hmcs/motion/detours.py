@@ -6,11 +6,10 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import Path
-
-FloatArray = NDArray[np.float64]
 
 _SPACING_M = 0.002
 _GOOD_ENOUGH_M = 1e-4
@@ -35,7 +34,7 @@ class Detour(NamedTuple):
 
 
 class _Obstacle(NamedTuple):
-    middle: FloatArray
+    middle: Array
     keep_m: float
     """So far from its middle a way has to stay."""
 
@@ -84,8 +83,8 @@ def around(
 
 
 def _bent(
-    places: FloatArray, points: FloatArray, obstacle: _Obstacle, half_m: float, turn_rad: float
-) -> FloatArray | None:
+    places: Array, points: Array, obstacle: _Obstacle, half_m: float, turn_rad: float
+) -> Array | None:
     """Return the points bent wherever they come too near; None where that does not help."""
     for _ in range(_MOST_BENDS):
         points = _bent_once(places, points, obstacle, half_m, turn_rad)
@@ -95,8 +94,8 @@ def _bent(
 
 
 def _bent_once(
-    places: FloatArray, points: FloatArray, obstacle: _Obstacle, half_m: float, turn_rad: float
-) -> FloatArray:
+    places: Array, points: Array, obstacle: _Obstacle, half_m: float, turn_rad: float
+) -> Array:
     """Return the points with a bend where they come nearest, clear of the sphere if it can be."""
     nearest = int(np.linalg.norm(points - obstacle.middle, axis=1).argmin())
     bump = _bump(places, places[nearest], half_m)
@@ -113,7 +112,7 @@ def _bent_once(
     return bent
 
 
-def _bump(places: FloatArray, top_m: float, half_m: float) -> FloatArray:
+def _bump(places: Array, top_m: float, half_m: float) -> Array:
     """A raised cosine about a place, that leaves the ends of the path where they are."""
     reach_m = np.where(
         places < top_m, min(half_m, top_m - places[0]), min(half_m, places[-1] - top_m)
@@ -122,7 +121,7 @@ def _bump(places: FloatArray, top_m: float, half_m: float) -> FloatArray:
     return np.where(share < 1.0, 0.5 * (1.0 + np.cos(np.pi * share)), 0.0)
 
 
-def _side(points: FloatArray, at: int, middle: FloatArray, turn_rad: float) -> FloatArray:
+def _side(points: Array, at: int, middle: Array, turn_rad: float) -> Array:
     """Unit vector across the path, away from the middle of the obstacle, turned about the path."""
     tangent = points[min(at + 1, len(points) - 1)] - points[max(at - 1, 0)]
     length_m = float(np.linalg.norm(tangent))
@@ -138,7 +137,7 @@ def _side(points: FloatArray, at: int, middle: FloatArray, turn_rad: float) -> F
     return np.asarray(np.cos(turn_rad) * away + np.sin(turn_rad) * np.cross(tangent, away))
 
 
-def _nearest_m(points: FloatArray, obstacle: _Obstacle) -> float:
+def _nearest_m(points: Array, obstacle: _Obstacle) -> float:
     """How near the straight pieces between points come to the middle of the obstacle."""
     path = Path(points)
     return float(np.linalg.norm(path.at(path.project(obstacle.middle)) - obstacle.middle))

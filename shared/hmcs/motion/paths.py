@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from hmcs.arrays import Array
 
 _TIE = 1e-9
 """Distances that differ by less than this share of the path's length count as equal."""
@@ -18,12 +18,12 @@ _TIE = 1e-9
 class _Pieces(NamedTuple):
     """The straight pieces of a path, those of no length left out."""
 
-    first: FloatArray
+    first: Array
     """Where each begins, m, shape (k, 3)."""
-    directions: FloatArray
+    directions: Array
     """Unit length, shape (k, 3)."""
-    starts: FloatArray
-    ends: FloatArray
+    starts: Array
+    ends: Array
     """Arc lengths, m, shape (k,)."""
 
 
@@ -34,9 +34,9 @@ class Path:
     Raises ValueError unless there are two different points at least, all of them finite.
     """
 
-    points: FloatArray
+    points: Array
     """m, shape (K, 3)."""
-    arc_length: FloatArray = field(init=False)
+    arc_length: Array = field(init=False)
     """Length of the path up to each point, m, shape (K,); begins with 0."""
     _pieces: _Pieces = field(init=False, repr=False)
 
@@ -59,7 +59,7 @@ class Path:
         """Length of the whole path, m."""
         return float(self.arc_length[-1])
 
-    def at(self, arc_length: ArrayLike) -> FloatArray:
+    def at(self, arc_length: ArrayLike) -> Array:
         """Return the point(s) at an arc length, m: shape (3,), or (n, 3) for n arc lengths.
 
         Before the first and after the last point the path stands still.
@@ -70,7 +70,7 @@ class Path:
         beyond = (s - pieces.starts[piece])[..., None]
         return np.asarray(pieces.first[piece] + beyond * pieces.directions[piece])
 
-    def tangent(self, arc_length: float, reach_m: float = 0.0) -> FloatArray:
+    def tangent(self, arc_length: float, reach_m: float = 0.0) -> Array:
         """Return the unit direction of travel at an arc length, shape (3,).
 
         With a reach it is the direction of the chord from so far behind to so far ahead (within
@@ -119,7 +119,7 @@ class Path:
         return float(s[best] if len(ties) == 1 else s[ties[np.abs(s[ties] - near).argmin()]])
 
 
-def resample(points: ArrayLike, count: int) -> FloatArray:
+def resample(points: ArrayLike, count: int) -> Array:
     """Return `count` points evenly spaced by arc length along points of shape (T, 3).
 
     Shape (count, 3), from the first point to the last.
@@ -131,7 +131,7 @@ def resample(points: ArrayLike, count: int) -> FloatArray:
     return path.at(np.linspace(0.0, path.length_m, count))
 
 
-def mean_path(paths: Sequence[ArrayLike], count: int = 100) -> tuple[FloatArray, FloatArray]:
+def mean_path(paths: Sequence[ArrayLike], count: int = 100) -> tuple[Array, Array]:
     """Return the mean of several paths and how far they lie beside it.
 
     Each path, points of shape (T, 3) in m, is taken from its own first point and resampled by arc
@@ -152,13 +152,13 @@ def mean_path(paths: Sequence[ArrayLike], count: int = 100) -> tuple[FloatArray,
     return points, np.sqrt((across**2).sum(axis=-1).mean(axis=0))
 
 
-def arc_length_of(points: FloatArray) -> FloatArray:
+def arc_length_of(points: Array) -> Array:
     """Return the length of the way up to each of the points, m, shapes (T, 3) and (T,)."""
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(pieces)]) if len(points) else pieces
 
 
-def _pieces_of(points: FloatArray, arc_length: FloatArray) -> _Pieces:
+def _pieces_of(points: Array, arc_length: Array) -> _Pieces:
     steps = np.diff(points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     long = np.diff(arc_length) > 0

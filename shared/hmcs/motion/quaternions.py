@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from hmcs.arrays import Array
 
 UNIT_WITHIN = 1e-3
 """A quaternion whose length differs from one by more is no rotation."""
@@ -19,7 +19,7 @@ def is_unit(quaternion: Iterable[float]) -> bool:
     return abs(math.hypot(*quaternion) - 1.0) <= UNIT_WITHIN
 
 
-def unit_quaternion(value: ArrayLike) -> FloatArray:
+def unit_quaternion(value: ArrayLike) -> Array:
     """Return `value`, shape (4,), with what rounding has done to its length undone.
 
     Raises ValueError when it is not four finite numbers of unit length.
@@ -32,12 +32,12 @@ def unit_quaternion(value: ArrayLike) -> FloatArray:
     return np.asarray(quaternion / math.hypot(*quaternion))
 
 
-def nearer(quaternion: FloatArray, to: FloatArray) -> FloatArray:
+def nearer(quaternion: Array, to: Array) -> Array:
     """Return the same rotation with the sign that is nearer to another, shapes (4,)."""
     return -quaternion if float(quaternion @ to) < 0 else quaternion
 
 
-def continuous(quaternions: ArrayLike) -> FloatArray:
+def continuous(quaternions: ArrayLike) -> Array:
     """Return the same rotations, shape (T, 4), each with the sign nearer to the one before."""
     given = np.asarray(quaternions, dtype=float)
     flips = (given[1:] * given[:-1]).sum(axis=1) < 0
@@ -45,7 +45,7 @@ def continuous(quaternions: ArrayLike) -> FloatArray:
     return np.where(turned[:, None], -given, given)
 
 
-def product(left: FloatArray, right: FloatArray) -> FloatArray:
+def product(left: Array, right: Array) -> Array:
     """Return the rotation `right` followed by `left`, x y z w, all of shape (4,)."""
     x, y, z, w = left.tolist()
     a, b, c, d = right.tolist()
@@ -59,19 +59,19 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
     )
 
 
-def inverse(quaternion: FloatArray) -> FloatArray:
+def inverse(quaternion: Array) -> Array:
     """Return the rotation back, of a unit quaternion, shape (4,)."""
     return np.asarray(quaternion * [-1.0, -1.0, -1.0, 1.0])
 
 
-def from_vector(vector: FloatArray) -> FloatArray:
+def from_vector(vector: Array) -> Array:
     """Return the quaternion of the rotation vector `vector`, rad, shape (3,)."""
     angle = float(np.linalg.norm(vector))
     # sinc keeps its digits where the angle goes to zero.
     return np.append(0.5 * np.sinc(angle / (2 * np.pi)) * vector, np.cos(angle / 2))
 
 
-def between(start: FloatArray, end: FloatArray) -> FloatArray:
+def between(start: Array, end: Array) -> Array:
     """Return the rotation vector, base frame, of at most π rad, that turns `start` into `end`."""
     turn = product(end, inverse(start))
     if turn[3] < 0:
@@ -81,13 +81,13 @@ def between(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(turn[:3] * (angle / sine if sine > 1e-12 else 2.0))
 
 
-def turned(orientation: FloatArray, angular_velocity: FloatArray, duration_s: float) -> FloatArray:
+def turned(orientation: Array, angular_velocity: Array, duration_s: float) -> Array:
     """Return `orientation` after turning with `angular_velocity`, rad/s, base frame."""
     result = product(from_vector(angular_velocity * duration_s), orientation)
     return np.asarray(result / np.linalg.norm(result))
 
 
-def from_matrix(rotation: FloatArray) -> FloatArray:
+def from_matrix(rotation: Array) -> Array:
     """Return the quaternion of a rotation matrix, (3, 3), w not negative (Bar-Itzhack 2000)."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
     symmetric = np.array(
@@ -98,11 +98,11 @@ def from_matrix(rotation: FloatArray) -> FloatArray:
             [zy - yz, xz - zx, yx - xy, xx + yy + zz],
         ]
     )
-    found: FloatArray = np.linalg.eigh(symmetric)[1][:, -1]
+    found: Array = np.linalg.eigh(symmetric)[1][:, -1]
     return -found if found[3] < 0 else found
 
 
-def rotation_matrix(quaternion: ArrayLike) -> FloatArray:
+def rotation_matrix(quaternion: ArrayLike) -> Array:
     """Return the rotation of a unit quaternion x y z w as a matrix, shape (3, 3).
 
     Raises ValueError as `unit_quaternion` does.

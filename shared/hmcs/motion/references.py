@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.operators import TaskSegment
 from hmcs.task import Task
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class References:
         )
 
 
-def random_gesteme(references: References, rng: np.random.Generator) -> FloatArray:
+def random_gesteme(references: References, rng: np.random.Generator) -> Array:
     """Return the points of a random line or arc, m, shape (K, 3), beginning at 0."""
     forward, sideways = _random_frame(references.dimensions, rng)
     lines = references.kind == "line" or (references.kind == "mixed" and rng.random() < 0.5)
@@ -76,11 +74,9 @@ def random_gesteme(references: References, rng: np.random.Generator) -> FloatArr
     return radius_m * (np.sin(s)[:, None] * forward + (1 - np.cos(s))[:, None] * sideways)
 
 
-def random_gestemes(
-    references: References, count: int, rng: np.random.Generator
-) -> list[FloatArray]:
+def random_gestemes(references: References, count: int, rng: np.random.Generator) -> list[Array]:
     """Return random gestemes that follow one another with a turn of θ_min at least."""
-    gestemes: list[FloatArray] = []
+    gestemes: list[Array] = []
     while len(gestemes) < count:
         points = random_gesteme(references, rng)
         if not gestemes or turn_rad(gestemes[-1], points) >= references.least_turn_rad:
@@ -89,7 +85,7 @@ def random_gestemes(
 
 
 def random_performance(
-    task: Task, gestemes: Mapping[str, FloatArray], rng: np.random.Generator, most_segments: int
+    task: Task, gestemes: Mapping[str, Array], rng: np.random.Generator, most_segments: int
 ) -> list[TaskSegment]:
     """Return the segments of a random run through a task's states.
 
@@ -106,18 +102,18 @@ def random_performance(
     return segments
 
 
-def turn_rad(before: FloatArray, after: FloatArray) -> float:
+def turn_rad(before: Array, after: Array) -> float:
     """Return the angle between the end of one gesteme and the start of the next."""
     end, start = before[-1] - before[-2], after[1] - after[0]
     cosine = end @ start / (np.linalg.norm(end) * np.linalg.norm(start))
     return math.acos(min(max(cosine, -1.0), 1.0))
 
 
-def _samples(length_m: float, sample_m: float) -> FloatArray:
+def _samples(length_m: float, sample_m: float) -> Array:
     return np.linspace(0.0, length_m, max(2, math.ceil(length_m / sample_m) + 1))
 
 
-def _random_frame(dimensions: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _random_frame(dimensions: int, rng: np.random.Generator) -> tuple[Array, Array]:
     vectors = np.zeros((2, 3))
     vectors[:, :dimensions] = rng.standard_normal((2, dimensions))
     forward = vectors[0] / np.linalg.norm(vectors[0])
@@ -125,6 +121,6 @@ def _random_frame(dimensions: int, rng: np.random.Generator) -> tuple[FloatArray
     return forward, sideways / np.linalg.norm(sideways)
 
 
-def _shares(follow: Mapping[str, float]) -> FloatArray:
+def _shares(follow: Mapping[str, float]) -> Array:
     shares = np.fromiter(follow.values(), dtype=float)
     return np.asarray(shares / shares.sum())

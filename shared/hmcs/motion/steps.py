@@ -12,12 +12,11 @@ from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.quaternions import nearer, unit_quaternion
-
-FloatArray = NDArray[np.float64]
 
 
 class Step(NamedTuple):
@@ -25,14 +24,14 @@ class Step(NamedTuple):
 
     index: int  # type: ignore[assignment]  # tuple.index is of no use here
     """t, counted from 0 without gaps."""
-    position: FloatArray
+    position: Array
     """x_t, m, shape (3,)."""
-    displacement: FloatArray
+    displacement: Array
     """x_{t+1} − x_t, m, shape (3,); at least δ long."""
-    orientation: FloatArray | None = None
+    orientation: Array | None = None
     """Of the hand where the step ends, unit quaternion x y z w, shape (4,), with the sign nearer to
     that of the step before; None where the device has none."""
-    wrench: FloatArray | None = None
+    wrench: Array | None = None
     """The operator's force, N, and torque, N·m, shape (6,): the mean over the samples of the step,
     the one that ends it included; None where the device has none."""
     mark: bool = False
@@ -55,8 +54,8 @@ class DeadZone:
             raise ValueError(f"radius_m is {radius_m}, expected a positive number of meters")
         self._radius_m = float(radius_m)
         self._count = 0
-        self._anchor: FloatArray | None = None
-        self._newest: FloatArray | None = None
+        self._anchor: Array | None = None
+        self._newest: Array | None = None
         self._offset = np.zeros(3)
         self._lifted = False
         self._senses = _Senses()
@@ -102,7 +101,7 @@ class DeadZone:
         self._lifted = True
         self._senses.mark |= self._senses.goes_down(pedal)
 
-    def _moved(self, seen: FloatArray) -> Step | None:
+    def _moved(self, seen: Array) -> Step | None:
         if self._anchor is None or self._newest is None:
             self._anchor = self._newest = seen
             self._lifted = False
@@ -120,7 +119,7 @@ class DeadZone:
         return step
 
 
-def _finite(name: str, value: ArrayLike, count: int) -> FloatArray:
+def _finite(name: str, value: ArrayLike, count: int) -> Array:
     numbers = np.array(value, dtype=float)
     if numbers.shape != (count,) or not np.isfinite(numbers).all():
         raise ValueError(f"{name} is {value!r}, expected {count} finite numbers")
@@ -133,11 +132,11 @@ class _Senses:
     def __init__(self) -> None:
         self.mark = False
         self._pedal = False
-        self._orientation: FloatArray | None = None
+        self._orientation: Array | None = None
         self._wrench_sum = np.zeros(6)
         self._wrench_count = 0
 
-    def feel(self, wrench: FloatArray | None) -> None:
+    def feel(self, wrench: Array | None) -> None:
         if wrench is not None:
             self._wrench_sum += wrench
             self._wrench_count += 1
@@ -146,7 +145,7 @@ class _Senses:
         before, self._pedal = self._pedal, pedal
         return pedal and not before
 
-    def along(self, step: Step, orientation: FloatArray | None) -> Step:
+    def along(self, step: Step, orientation: Array | None) -> Step:
         """Return the step with all that came along with it, and begin anew."""
         if orientation is not None:
             if self._orientation is not None:

@@ -6,22 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import arc_length_of
 from hmcs.motion.quaternions import continuous, inverse, product, unit_quaternion
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Turns:
     """Rotations from the orientation a path was begun in, at even shares of its length."""
 
-    quaternions: FloatArray
+    quaternions: Array
     """x y z w, base frame, each near the one before, shape (K, 4)."""
 
-    def at(self, progress: float) -> FloatArray:
+    def at(self, progress: float) -> Array:
         """Return the rotation at a share of the path's length, 0 to 1, x y z w, shape (4,)."""
         place = min(max(progress, 0.0), 1.0) * (len(self.quaternions) - 1)
         before = min(int(place), len(self.quaternions) - 2)
@@ -32,7 +31,7 @@ class Turns:
 
 def mean_turns(
     paths: Sequence[ArrayLike], orientations: Sequence[ArrayLike], count: int = 100
-) -> FloatArray:
+) -> Array:
     """Return the mean rotation since the beginning, x y z w, at `count` even shares of length.
 
     Of several performances: points, m, shape (T, 3), and unit quaternions, shape (T, 4), each.

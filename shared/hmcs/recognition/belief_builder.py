@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hmcs.arrays import Array
 from hmcs.recognition.recognizer import Recognition, TaskBelief
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm
-
 
 MEAN_STEPS = 20
 """The mean log-likelihood is taken over so many steps."""

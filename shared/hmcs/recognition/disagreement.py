@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import resample
 from hmcs.motion.turns import mean_turns
 from hmcs.recognition.segments import LearningError, Segment

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import mean_path
 from hmcs.motion.turns import mean_turns

@@ -6,8 +6,6 @@ here, so what runs over the bus is what runs in process.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import logging
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -15,6 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 
 Integers = NDArray[np.int32]

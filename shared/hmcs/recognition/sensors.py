@@ -8,17 +8,14 @@ Shapes: T steps, F dimensions.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.quaternions import between
 from hmcs.motion.steps import Step
-
 
 
 class Sensors(NamedTuple):

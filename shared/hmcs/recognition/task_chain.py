@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.task import Task
 
 Integers = NDArray[np.int32]

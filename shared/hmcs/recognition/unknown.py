@@ -8,15 +8,13 @@ step of a known motion cannot spoil a window, since it counts as no worse than a
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 LEAST_KNOWN = 1e-6
 """P(part of the task) is held to be no less than this."""

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import Path
 from hmcs.recognition.model import Model
@@ -18,7 +19,6 @@ from hmcs_local.demo.recording import NO_SAMPLE, Beliefs, Recording
 from hmcs_local.demo.tracks import Track, track
 from hmcs_local.demo.truth import RunError, SampleClock, Segment
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 ASKED_FOR = ("disengaged", "no_command")
@@ -30,9 +30,9 @@ _NS_PER_MS = 1_000_000
 class Hops(NamedTuple):
     """Latencies, ms: one for each operator sample, or step, that has one."""
 
-    input_to_command: FloatArray
-    input_to_robot: FloatArray
-    step_to_belief: FloatArray
+    input_to_command: Array
+    input_to_robot: Array
+    step_to_belief: Array
 
 
 class Measured(NamedTuple):
@@ -43,11 +43,11 @@ class Measured(NamedTuple):
     segments: tuple[Segment, ...]
     step_end: IntArray
     """Number of the played sample that completed each step, shape (T,)."""
-    step_time_s: FloatArray
+    step_time_s: Array
     """When that was, shape (T,)."""
-    probabilities: FloatArray
+    probabilities: Array
     """P(state) after each step, NaN where there was no belief, shape (T, S)."""
-    unknown: FloatArray
+    unknown: Array
     """P(unknown) after each step, shape (T,)."""
     true_states: IntArray
     """Shape (T,)."""
@@ -57,13 +57,13 @@ class Measured(NamedTuple):
     scores: Scores
     hand: Track
     tool: Track
-    factor_time_s: FloatArray
-    factor: FloatArray
+    factor_time_s: Array
+    factor: Array
     """k of the fixture at `factor_time_s`."""
     hops: Hops
-    belief_delay_ms: FloatArray
+    belief_delay_ms: Array
     """From each Step to its Belief or, where it is missing, to the next one or the end; (T,)."""
-    tracking_error_m_s: FloatArray
+    tracking_error_m_s: Array
     """Norm of the tool's velocity less its reference, at each state of the driven robot."""
     collisions: int
     stops: int
@@ -169,13 +169,13 @@ def _rows_of(beliefs: Beliefs, index: IntArray) -> IntArray:
     return np.array([rows.get(int(step), NONE) for step in index], dtype=np.int64)
 
 
-def _delays_ms(asked_ns: IntArray, answer_ns: IntArray) -> FloatArray:
+def _delays_ms(asked_ns: IntArray, answer_ns: IntArray) -> Array:
     """A step that was never answered waits for the answer to a later one."""
     until_ns = np.minimum.accumulate(answer_ns[::-1])[::-1]
     return np.asarray((until_ns - asked_ns) / _NS_PER_MS)
 
 
-def _hops(recording: Recording, step_to_belief: FloatArray) -> Hops:
+def _hops(recording: Recording, step_to_belief: Array) -> Hops:
     commands, robot = recording.commands, recording.robot
     engaged = commands.engaged & (commands.sample != NO_SAMPLE)
     driven = np.flatnonzero(robot.sample != NO_SAMPLE)

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from hmcs.arrays import Array
+
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 TextArray = NDArray[np.str_]
@@ -29,7 +30,7 @@ class Motions(NamedTuple):
     sample: IntArray
     captured_ns: IntArray
     received_ns: IntArray
-    position: FloatArray
+    position: Array
     """m, operator frame, shape (n, 3)."""
     dead_man: BoolArray
 
@@ -43,9 +44,9 @@ class Steps(NamedTuple):
     received_ns: IntArray
     number: IntArray
     """t."""
-    position: FloatArray
+    position: Array
     """x_t, m, shape (n, 3)."""
-    displacement: FloatArray
+    displacement: Array
     """x_{t+1} − x_t, m, shape (n, 3)."""
 
 
@@ -55,9 +56,9 @@ class Beliefs(NamedTuple):
     received_ns: IntArray
     step: IntArray
     """t."""
-    probabilities: FloatArray
+    probabilities: Array
     """Of each state, shape (n, S)."""
-    unknown: FloatArray
+    unknown: Array
     missing_gestemes: IntArray
     """How many gestemes no evidence came for."""
 
@@ -77,7 +78,7 @@ class Fixtures(NamedTuple):
     sample: IntArray
     captured_ns: IntArray
     received_ns: IntArray
-    factor: FloatArray
+    factor: Array
     """k."""
     engaged: BoolArray
     reason: TextArray
@@ -90,11 +91,11 @@ class RobotStates(NamedTuple):
     """The one whose command the robot follows."""
     captured_ns: IntArray
     received_ns: IntArray
-    tool_position: FloatArray
+    tool_position: Array
     """m, base frame, shape (n, 3)."""
-    tool_velocity: FloatArray
+    tool_velocity: Array
     """m/s, shape (n, 3)."""
-    reference_velocity: FloatArray
+    reference_velocity: Array
     """m/s, shape (n, 3)."""
     in_contact: BoolArray
     stop: TextArray

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import Path
 from hmcs_local.demo.truth import Segment
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
@@ -24,18 +24,18 @@ class Track(NamedTuple):
 
     sample: IntArray
     """Number of the played sample each point goes back to."""
-    position: FloatArray
+    position: Array
     """m, shape (n, 3)."""
-    error_m: FloatArray
+    error_m: Array
     """Distance to the mean demonstration of the true segment; NaN outside of any."""
 
 
 def track(
     sample: IntArray,
-    position: FloatArray,
+    position: Array,
     segments: Sequence[Segment],
     learned: Sequence[Path | None],
-    hand: FloatArray,
+    hand: Array,
     stood: BoolArray | None = None,
 ) -> Track:
     """Return a track with its distances to the mean demonstrations.
@@ -56,9 +56,7 @@ def track(
     return Track(sample, position, error_m)
 
 
-def _missed(
-    sample: IntArray, position: FloatArray, hand: FloatArray, stood: BoolArray
-) -> FloatArray:
+def _missed(sample: IntArray, position: Array, hand: Array, stood: BoolArray) -> Array:
     """How far the hand has moved so far without the robot, m, shape (n, 3)."""
     missed = np.zeros_like(position)
     after = np.flatnonzero(stood)
@@ -67,7 +65,7 @@ def _missed(
     return missed.cumsum(axis=0)
 
 
-def path_errors(path: Path, displacements: FloatArray) -> FloatArray:
+def path_errors(path: Path, displacements: Array) -> Array:
     """Return how far each displacement from the path's origin, m, shape (n, 3), is from it, (n,).
 
     Each is matched with a point of the path such that none is matched with one behind that of the

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.scoring import NONE
 from hmcs_local.demo.recording import Motions
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SAMPLE_TOLERANCE_M = 1e-4
@@ -87,7 +87,7 @@ class SampleClock:
         numbers = np.interp(sample, self._samples, self._numbers)
         return np.asarray(np.rint(numbers).astype(np.int64))
 
-    def seconds(self, local_ns: FloatArray | IntArray) -> FloatArray:
+    def seconds(self, local_ns: Array | IntArray) -> Array:
         """Return times of the machine's monotonic clock as s after the hand began to move."""
         return np.asarray((local_ns - self._begin_ns) / NS_PER_S)
 
@@ -104,7 +104,7 @@ class SampleClock:
         )
 
 
-def _played(positions: FloatArray, guess: FloatArray, seen: FloatArray, pause: float) -> IntArray:
+def _played(positions: Array, guess: Array, seen: Array, pause: float) -> IntArray:
     """The number of the played sample nearest to each position seen, close to the guess.
 
     The guess is that of a hand that never waits; it may have, in gaps of more than `pause` samples.

@@ -5,8 +5,6 @@ Times are s since the recording's first message, as its outline has them.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
@@ -14,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.bus.messages import Outline, SetLabels
 from hmcs.recordings.stretches import (
     NS_PER_S,
@@ -27,7 +26,6 @@ from hmcs.recordings.stretches import (
 )
 from hmcs_console.drawing.palette import UNKNOWN, Color, color_of
 from hmcs_console.drawing.pieces import Pieces
-
 
 CHOSEN: Color = (60, 60, 60)
 MOST = 1e7

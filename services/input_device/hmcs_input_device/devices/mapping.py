@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs_input_device.devices.reading import AXES, DeviceReading
 from hmcs_input_device.settings import AxisName, DeviceSettings
 from hmcs_input_device.sources import FARTHEST_M
-
-FloatArray = NDArray[np.float64]
 
 FOLLOW_S = 0.08
 """Time constant with which the hand follows a pointer, which tells its place in jerks; also the
@@ -41,7 +39,7 @@ class AxisMap(NamedTuple):
     y: AxisName
     z: AxisName
 
-    def matrix(self) -> FloatArray:
+    def matrix(self) -> Array:
         """Return what makes a vector of the operator frame of a device's axes, shape (3, 6)."""
         matrix = np.zeros((3, len(AXES)))
         for row, name in enumerate(self):
@@ -87,7 +85,7 @@ class Rules(NamedTuple):
     """How a device moves the hand."""
 
     kind: Kind
-    axes: FloatArray
+    axes: Array
     """Shape (3, 6), see `AxisMap.matrix`."""
     buttons: Buttons
     scale_m_s: float
@@ -102,16 +100,16 @@ class Rules(NamedTuple):
 class Hand(NamedTuple):
     """The hand that a device moves, and what the next reading is judged by."""
 
-    position: FloatArray = np.zeros(3)
+    position: Array = np.zeros(3)
     """m, operator frame, shape (3,): the integral of its velocities."""
-    velocity: FloatArray = np.zeros(3)
+    velocity: Array = np.zeros(3)
     """m/s, shape (3,), over the time since the reading before."""
     dead_man: bool = False
     clutch: bool = False
     pedal: bool = False
     last: DeviceReading | None = None
     """The reading before; None where it could not be used."""
-    due: FloatArray = np.zeros(3)
+    due: Array = np.zeros(3)
     """m, shape (3,): what a pointer has moved and the hand has not yet."""
 
 
@@ -165,7 +163,7 @@ def check_buttons(settings: DeviceSettings, rules: Rules, there: Sequence[str]) 
             )
 
 
-def banded(deflection: FloatArray, dead_band: float) -> FloatArray:
+def banded(deflection: Array, dead_band: float) -> Array:
     """Return each deflection without the dead band: 0 within, growing from 0 to ±1 beyond it."""
     beyond = np.maximum(np.abs(deflection) - dead_band, 0.0) / (1.0 - dead_band)
     return np.asarray(np.sign(deflection) * beyond)
@@ -235,18 +233,18 @@ def _moves(hand: Hand) -> bool:
     return hand.dead_man and not hand.clutch
 
 
-def _clipped(reading: DeviceReading) -> FloatArray:
+def _clipped(reading: DeviceReading) -> Array:
     return np.clip(reading.axes, -1.0, 1.0)
 
 
-def _velocity(last: DeviceReading, reading: DeviceReading, rules: Rules) -> FloatArray:
+def _velocity(last: DeviceReading, reading: DeviceReading, rules: Rules) -> Array:
     before, now = (rules.axes @ _clipped(each) for each in (last, reading))
     if np.abs(now - before).max() > rules.jump:
         return np.zeros(3)
     return rules.scale_m_s * _limited(banded(now, rules.dead_band), 1.0)
 
 
-def _due(due: FloatArray, last: DeviceReading, reading: DeviceReading, rules: Rules) -> FloatArray:
+def _due(due: Array, last: DeviceReading, reading: DeviceReading, rules: Rules) -> Array:
     assert last.pointer is not None
     assert reading.pointer is not None
     pixels = np.subtract(reading.pointer, last.pointer)
@@ -257,7 +255,7 @@ def _due(due: FloatArray, last: DeviceReading, reading: DeviceReading, rules: Ru
     return _limited(due + way, rules.scale_m_s * FOLLOW_S)
 
 
-def _limited(vector: FloatArray, most: float) -> FloatArray:
+def _limited(vector: Array, most: float) -> Array:
     length = float(np.linalg.norm(vector))
     return vector * (most / length) if length > most else vector
 

@@ -5,13 +5,12 @@ They are the very objects that the services run, driven by a clock of their own.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.fixtures.compliance.trust import SegmentBelief
 from hmcs.fixtures.controller.controller import Controller
 from hmcs.fixtures.controller.interface import Fixture, Guides, OperatorSample
@@ -26,7 +25,6 @@ from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.registry import recognizer_of
 from hmcs_laboratory.assistance.robots import SimulatedRobot, robot_of
 from hmcs_laboratory.assistance.scenarios import Scenario, Taught
-
 
 
 class Run(NamedTuple):

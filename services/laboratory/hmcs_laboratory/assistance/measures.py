@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import Path
 from hmcs_laboratory.assistance.loop import Run
 from hmcs_laboratory.assistance.scenarios import Scenario
-
 
 WINDOW_M = 0.02
 """The robot is looked for so far around where its operator takes it to be."""

@@ -8,18 +8,15 @@ A distribution that simulates a robot in process names it in its `pyproject.toml
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from importlib.metadata import entry_points
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import Task
 from hmcs.task.model import unknown
-
 
 ENTRY_POINTS = "hmcs.simulated_robots"
 LAG = "lag"

@@ -6,22 +6,19 @@ else.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.detours import Detour, around
 from hmcs.motion.lasa import drawings, read_drawing
 from hmcs.motion.operators import joined
 from hmcs.motion.paths import Path, resample
 from hmcs.task import Obstacle, Task, Workspace, find_task, load_task
-
 
 _SAMPLE_M = 0.002
 LENGTHS = (0.7, 1.3)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.lasa import drawings, shapes
 from hmcs_laboratory.data.gestemes import GestemeSet
-
 
 
 def equal_steps(positions: Array, step_m: float) -> Array:

@@ -5,18 +5,15 @@ Each sample that the simulated hand makes is a step.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.operators import Operator
 from hmcs.motion.references import References, random_gestemes
 from hmcs_laboratory.data.hands import moved
-
 
 
 class GestemeSet(NamedTuple):

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.operators import joined
 from hmcs.motion.references import References, random_gesteme, random_gestemes, turn_rad
 from hmcs.recognition.segments import LearningError, segments_of
 from hmcs_laboratory.data.hands import Count, CurveSettings, Positive, moved
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task
-
 
 FIVE_STATES = ("l1", "c1", "l2", "c1", "l3")
 """Gestemes of the states of fig. 4.11: one arc serves two of them."""

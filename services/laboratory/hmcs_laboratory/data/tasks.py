@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.scoring import NONE, midway_labels

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.lasa import drawings, shapes
 from hmcs.motion.steps import Step
-
 
 _SEVERAL = "Multi_Models"
 

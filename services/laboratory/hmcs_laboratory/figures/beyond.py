@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
@@ -13,6 +11,7 @@ from matplotlib.figure import Figure as Picture
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.registry import recognizer_of
@@ -39,7 +38,6 @@ from hmcs_laboratory.figures.drawing import (
     new_picture,
 )
 from hmcs_laboratory.study import StudySettings, stream_of
-
 
 _NAMES = {
     "hmcs-segment-filter": "segment filter",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from itertools import combinations, groupby, pairwise
 from typing import Annotated, Any, NamedTuple
@@ -15,6 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from hmcs.arrays import Array
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, shapes

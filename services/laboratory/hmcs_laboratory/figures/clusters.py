@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 from pydantic import Field
 
+from hmcs.arrays import Array
 from hmcs_baselines.clustering import k_means
 from hmcs_baselines.elbow import (
     ClusterSearch,
@@ -33,7 +31,6 @@ from hmcs_laboratory.figures.drawing import (
     new_picture,
 )
 from hmcs_laboratory.study import StudySettings
-
 
 
 class DirectionsSettings(StudySettings):

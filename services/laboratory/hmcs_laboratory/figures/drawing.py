@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,8 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Picture
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import ArrayLike, NDArray
-
+from numpy.typing import ArrayLike
 
 COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
 """Told apart by all kinds of color vision; states beyond them begin again, with other marks."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
@@ -44,7 +42,6 @@ from hmcs_laboratory.figures.drawing import (
     new_picture,
 )
 from hmcs_laboratory.study import StudySettings
-
 
 _PERIOD_S = 0.01
 _MOST_S = 120.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.fixtures.compliance.cues import stiffness_kept
 from hmcs.fixtures.compliance.factor import FREE_FACTOR, Line, crossing, optimal_compliance
 from hmcs.fixtures.guides.pull import project_to_path, pulled_direction
@@ -35,7 +34,6 @@ from hmcs_laboratory.figures.drawing import (
     new_picture,
 )
 from hmcs_laboratory.study import StudySettings
-
 
 SPEED_M_S = 0.1
 _MM = 1e3

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,6 @@ from hmcs_laboratory.figures.experiments import draw_box
 from hmcs_laboratory.studies.assistance import Lesson, LoopSettings, performed
 from hmcs_laboratory.studies.force_tasks import FREE, ForceTaskSettings, recognized
 from hmcs_laboratory.study import seed_from
-
 
 
 def trajectories_of_force_tasks(settings: ForceTaskSettings, rng: np.random.Generator) -> Drawn:

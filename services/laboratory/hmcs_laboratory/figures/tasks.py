@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import recognizer_of

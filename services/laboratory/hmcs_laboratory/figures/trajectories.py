@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,6 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.operators import Trace, joined
 from hmcs.motion.references import random_gestemes
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, moved
@@ -28,7 +27,6 @@ from hmcs_laboratory.figures.drawing import (
     mark_of,
     new_picture,
 )
-
 
 
 class TrajectorySettings(CurveSettings):

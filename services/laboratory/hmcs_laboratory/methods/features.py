@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 
 def directions(positions: Array) -> Array:

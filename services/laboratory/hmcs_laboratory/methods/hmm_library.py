@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.cluster import KMeans
 
+from hmcs.arrays import Array
 from hmcs_laboratory.methods.features import directions, flat
 from hmcs_laboratory.methods.libraries import peer
 from hmcs_laboratory.methods.whole import Examples
-
 
 STATES = 5
 ITERATIONS = 20

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step
 from hmcs.recognition.hmm.emissions import Gaussian
@@ -26,7 +24,6 @@ from hmcs_laboratory.data.tasks import as_performance, path_of
 from hmcs_laboratory.methods.features import directions
 from hmcs_laboratory.methods.online import Fresh
 from hmcs_laboratory.methods.windows import FROM_START, LONG, Window, fit_window_trees
-
 
 PHASES = 5
 VARIANCE_FLOOR = 0.01

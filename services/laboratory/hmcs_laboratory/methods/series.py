@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import warnings
 from dataclasses import dataclass
 from functools import cache
@@ -12,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_laboratory.methods.features import evenly, flat, labels
 from hmcs_laboratory.methods.libraries import peer
 from hmcs_laboratory.methods.whole import Examples
-
 
 LEAST_SAMPLES = 9
 """MiniRocket takes no series shorter than this."""

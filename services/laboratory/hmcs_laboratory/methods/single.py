@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_laboratory.methods.whole import Examples
 from hmcs_laboratory.single_gestemes.learning import learn_single
 from hmcs_laboratory.single_gestemes.model import SingleGestemes, scores
-
 
 
 @dataclass(frozen=True)

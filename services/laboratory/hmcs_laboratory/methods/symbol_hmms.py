@@ -5,8 +5,6 @@ Shapes: M gestemes of N states; T observations of D symbols at a time, of K kind
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import Discrete, MultiDiscrete
 from hmcs.recognition.hmm.learning import baum_welch
 from hmcs.recognition.hmm.model import Hmm

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
+from hmcs.arrays import Array
 from hmcs_laboratory.methods.features import flat, labels, shape_and_length
 from hmcs_laboratory.methods.whole import Examples, TooFewError
 from hmcs_laboratory.methods.windows import FROM_START, fit_window_trees, log_shares
-
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_laboratory.data.gestemes import GestemeSet
 
 Examples = Sequence[Sequence[Array]]

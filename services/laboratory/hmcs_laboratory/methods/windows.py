@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
+from hmcs.arrays import Array
 from hmcs_laboratory.methods.features import directions
-
 
 TREES = 100
 LEAST_SHARE = 1e-3

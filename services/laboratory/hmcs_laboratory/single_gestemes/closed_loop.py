@@ -22,14 +22,13 @@ compared with it, K nodes looked at around the phase. Lengths have the unit of t
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.segment_filter.exits import exit_features, exit_probability
 from hmcs_laboratory.single_gestemes.projected_normal import log_density
 

@@ -9,16 +9,26 @@ Shapes as in `closed_loop`; R rows: the steps of all performances that were foll
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.segment_filter.exits import DEFAULT_WEIGHTS, exit_features, fit_exit
-from hmcs_laboratory.single_gestemes.closed_loop import ClosedLoop, Indices, Paths, Phases, mean_node, next_phases, over_phases, phases_at_start, unit, wanted_direction
+from hmcs_laboratory.single_gestemes.closed_loop import (
+    ClosedLoop,
+    Indices,
+    Paths,
+    Phases,
+    mean_node,
+    next_phases,
+    over_phases,
+    phases_at_start,
+    unit,
+    wanted_direction,
+)
 from hmcs_laboratory.single_gestemes.even_points import length_of, step_lengths
 from hmcs_laboratory.single_gestemes.mean_paths import ahead, mean_path, normals, padded
 from hmcs_laboratory.single_gestemes.step_errors import Spread, errors, fitted_spread

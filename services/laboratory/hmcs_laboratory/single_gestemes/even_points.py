@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 
 def evenly(positions: Array, count: int) -> Array:

@@ -5,8 +5,6 @@ Shapes as there; n examples altogether.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable, Sequence
 from itertools import product
 from typing import NamedTuple
@@ -14,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.segment_filter.variants import VariantSettings, split_into_variants
 from hmcs_laboratory.single_gestemes.closed_loop_learning import ClosedLoopSettings, fit_closed_loop
 from hmcs_laboratory.single_gestemes.model import (

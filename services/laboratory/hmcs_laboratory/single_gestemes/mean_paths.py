@@ -5,12 +5,11 @@ Shapes as in `closed_loop`.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs_laboratory.single_gestemes.closed_loop import Paths, unit
 from hmcs_laboratory.single_gestemes.even_points import evenly, length_of, step_lengths
 

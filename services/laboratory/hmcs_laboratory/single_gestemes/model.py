@@ -14,14 +14,13 @@ the unit of positions may be any, the same throughout.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs_laboratory.single_gestemes.closed_loop import (
     ClosedLoop,

@@ -12,13 +12,11 @@ E[r²] = s j_{D+1} / j_{D−1}. Shapes: n directions; v and s are given for each
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 # Of exp(x²) erfc(x) for x > 0, relative error below 1.2e-7 (Numerical Recipes, 6.2).
 _ERFCX = (

@@ -5,17 +5,14 @@ Shapes: D axes, n motions, C points evenly along a motion, its start left out.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs_laboratory.single_gestemes.closed_loop import unit
 from hmcs_laboratory.single_gestemes.even_points import evenly, step_lengths
-
 
 
 class HandSettings(NamedTuple):

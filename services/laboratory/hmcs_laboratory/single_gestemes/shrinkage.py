@@ -5,12 +5,12 @@ Shapes: n examples of V classes, F features.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmcs.arrays import Array
 
 Indices = NDArray[np.intp]
 

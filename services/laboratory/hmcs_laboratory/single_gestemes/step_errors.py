@@ -6,12 +6,11 @@ is seen, unless it tells nothing, with probability o. Shapes: R steps, D axes.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs_laboratory.single_gestemes.closed_loop import direction_densities
 from hmcs_laboratory.single_gestemes.projected_normal import lengths
 

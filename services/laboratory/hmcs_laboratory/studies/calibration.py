@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
@@ -11,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from hmcs.arrays import Array
 from hmcs.recognition.scoring import NONE
 from hmcs_laboratory.calibration import all_classes_error, brier_score, reliability
 from hmcs_laboratory.data.drawn_tasks import any_order, fixed_order

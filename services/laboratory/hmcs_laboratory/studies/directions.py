@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -16,6 +14,7 @@ from pydantic import AfterValidator, Field
 from sklearn.cluster import KMeans
 from sklearn.metrics import silhouette_score
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import Step
 from hmcs.recognition.learning import learn

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from sklearn.metrics import roc_auc_score
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.recognizer import Recognition
@@ -33,7 +31,6 @@ from hmcs_laboratory.data.unknown_motions import (
 from hmcs_laboratory.methods.online import Fresh
 from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm
 from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
-
 
 Data = Literal["five-states", "drawings"]
 Motion = Literal["shapes", "smooth", "reaches"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -13,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from hmcs.arrays import Array
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, read_drawing

@@ -7,10 +7,9 @@ states and products with transitions then run along contiguous memory.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import ModelError, ObservationError
 from hmcs.recognition.hmm.inference import LOST
 

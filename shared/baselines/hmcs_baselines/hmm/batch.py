@@ -7,14 +7,13 @@ most (fewer and shorter ones are padded); F dimensions, S symbols. Recursions ov
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.emissions import (
     Discrete,

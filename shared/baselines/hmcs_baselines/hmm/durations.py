@@ -7,13 +7,12 @@ Shapes: N states, T steps of a sequence, D the longest duration, steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs_baselines.hmm.markov import checked_rows, checked_states
 

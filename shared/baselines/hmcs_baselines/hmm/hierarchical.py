@@ -11,14 +11,13 @@ Shapes: C children of an internal state, L production states in depth-first orde
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.model import E, Hmm
 from hmcs_baselines.hmm.markov import checked_rows

@@ -11,8 +11,6 @@ Shapes: K models in a layer, N states in the largest of them, M classes of the l
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,6 +18,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.emissions import Discrete, Emission, Observations
 from hmcs.recognition.hmm.inference import ImpossibleSequenceError

@@ -5,14 +5,13 @@ Shapes: N states, T steps. States are indices 0..N−1.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 
 States = NDArray[np.int64]

@@ -12,14 +12,13 @@ long).
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.inference import ImpossibleSequenceError
 from hmcs.recognition.hmm.log_transitions import log_of
 from hmcs_baselines.hmm.durations import DurationError

@@ -6,14 +6,13 @@ Shapes: N states, T steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import Discrete, ObservationError, Observations
 from hmcs.recognition.hmm.learning import CHAIN, baum_welch
 from hmcs.recognition.hmm.model import Hmm

@@ -6,8 +6,6 @@ side), F dimensions, S symbols.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
@@ -15,6 +13,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, ModelError, floored
 
 Mask = NDArray[np.bool_]

@@ -8,14 +8,13 @@ Shapes: T_d steps of performance d, N points of the mean.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.discovery.curve_pieces import axes_filled
 
 Integers = NDArray[np.int64]

@@ -9,12 +9,12 @@ Shapes: N points of the path, P stretches.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmcs.arrays import Array
 
 Integers = NDArray[np.int64]
 

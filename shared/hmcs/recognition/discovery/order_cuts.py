@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.discovery.consensus import Consensus, between, consensus
 from hmcs.recognition.discovery.curve_pieces import Stretches, cut, fitted, parameters, stretches_of
 from hmcs.recognition.discovery.stops import stops

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -11,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.paths import resample
 
 Integers = NDArray[np.int64]

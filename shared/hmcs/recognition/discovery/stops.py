@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.discovery.consensus import Consensus
-
 
 _SLACK_STEPS = 3
 """Aligned by its shape alone, a performance passes a point of the path so many steps too early or

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmcs.arrays import Array
 
 Integers = NDArray[np.int64]
 

@@ -11,14 +11,13 @@ Shapes: T samples of a demonstration, G gestemes, S states.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import mean_path
 from hmcs.recognition.discovery.consensus import alike

@@ -5,8 +5,6 @@ Shapes: N states, T observations, F dimensions, K mixture components.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -14,6 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.observations import (
     ModelError,
     ObservationError,

@@ -10,8 +10,6 @@ Shapes: N states, T observations, F dimensions of continuous observations, M sym
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -19,6 +17,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.densities import Gaussian, Mixture, check_spread, log_gaussians
 from hmcs.recognition.hmm.observations import (
     DrawingEmission,

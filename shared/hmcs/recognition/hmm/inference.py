@@ -7,13 +7,12 @@ sum to less than one: what is missing is the probability of leaving the model. A
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.recognition.hmm.log_transitions import LogTransitions, log_of, log_sum
 

@@ -8,13 +8,12 @@ probability of leaving) stays too.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Generic, NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import ModelError, ObservationError, Observations
 from hmcs.recognition.hmm.inference import Smoothed, log_likelihood, shortest_path, smooth
 from hmcs.recognition.hmm.model import (

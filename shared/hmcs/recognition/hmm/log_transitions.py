@@ -6,11 +6,9 @@ them instead of O(N²). Shapes: N states, T observations.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 _MOST_AT_ONCE = 1_000_000
 """Numbers in the largest array that is made for a sum over all pairs of states."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.emissions import (
     DrawingEmission,

@@ -6,10 +6,9 @@ initial distributions (N,).
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 
 

@@ -13,13 +13,13 @@ Shapes: p pairs, G gestemes, N phases, D axes, F = 2·D observed dimensions, R c
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmcs.arrays import Array
 
 Integers = NDArray[np.int32]
 

@@ -9,11 +9,10 @@ Shapes: p pairs of a gesteme and a start, D axes.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 
 LOWEST, HIGHEST = 2e-4, 0.95
 """No exit is surer than that."""

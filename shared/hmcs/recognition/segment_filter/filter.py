@@ -14,13 +14,12 @@ Shapes: S states, K slots (a slot is one gesteme in one state), h living hypothe
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.recognizer import StepEvidence, TaskBelief
 from hmcs.recognition.task_chain import TaskChain
 

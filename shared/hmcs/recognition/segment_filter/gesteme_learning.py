@@ -8,14 +8,12 @@ which no agreement between demonstrations is believed.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.hmm.emissions import Gaussian
 from hmcs.recognition.hmm.learning import EMISSION, baum_welch
 from hmcs.recognition.hmm.model import Hmm
@@ -32,7 +30,6 @@ from hmcs.recognition.segment_filter.senses import (
 )
 from hmcs.recognition.segment_filter.variants import VariantSettings, split_into_variants
 from hmcs.recognition.segments import Segment
-
 
 
 class LearningSettings(NamedTuple):

@@ -10,14 +10,13 @@ phases), D axes looked at, F = 2·D observed dimensions, p living pairs.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.recognizer import StepEvidence
 from hmcs.recognition.segment_filter import alignment

@@ -5,14 +5,12 @@ What is a threshold is taken from demonstrations that the models at hand were no
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import axes_of
 from hmcs.recognition.segment_filter.alignment import Alignment
@@ -30,7 +28,6 @@ from hmcs.recognition.segments import LearningError, Segment
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import fit_of, learn_alarm
 from hmcs.task import Task
-
 
 
 def learn_layers(

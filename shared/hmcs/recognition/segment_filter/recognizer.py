@@ -6,13 +6,12 @@ runs in process.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model

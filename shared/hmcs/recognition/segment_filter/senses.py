@@ -8,17 +8,14 @@ Shapes: G gestemes, N phases, S dimensions of all senses together, T steps.
 
 from __future__ import annotations
 
-from hmcs.arrays import Array
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmcs.arrays import Array
 from hmcs.recognition.segments import LearningError, Segment
 from hmcs.recognition.sensors import Sensors, dimensions, sensor_rows, sensors_of
-
 
 _FLOOR_SHARE = 0.25
 """No phase is surer of a sense than this share of the sense's spread over all gestemes."""
