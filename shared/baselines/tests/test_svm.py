@@ -101,7 +101,7 @@ def test_settings_that_are_not_positive_are_refused():
 
 def test_without_scikit_learn_the_user_is_told_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.svm", None)
-    with pytest.raises(LearningMissingError, match=r"hmcs\[learning\]"):
+    with pytest.raises(LearningMissingError, match=r"hmcs-baselines\[learning\]"):
         fit_machines(np.eye(2), [0, 1])
 
 
