@@ -12,7 +12,7 @@ import pytest
 from browser.viewing import MANY_COLORS, TASK, Cell, Viewer
 from hmcs.bus.messages import Belief
 from hmcs.task import load_task
-from hmcs_console.drawing.palette import color_of
+from hmcs_console.shapes.palette import color_of
 from support.stack import Stack
 
 pytestmark = pytest.mark.browser

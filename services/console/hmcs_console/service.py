@@ -27,22 +27,22 @@ from hmcs.fixtures.controller.rules import rules_of
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped
-from hmcs_console.operating.hands import FLOOD, Hands
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
 from hmcs_console.requesting import Requesting
 from hmcs_console.seeing.history import EVERY_S
 from hmcs_console.seeing.listening import Listening
+from hmcs_console.seeing.marking import Marking, pressed
 from hmcs_console.seeing.models import Models, load_models, task_of
 from hmcs_console.seeing.presence import Presence
 from hmcs_console.seeing.seen import Picture, Seen
 from hmcs_console.serving.encryption import encryption
 from hmcs_console.serving.gateway import Gateway, Served
+from hmcs_console.serving.hands import FLOOD, Hands
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
 from hmcs_console.teaching import wishes
-from hmcs_console.teaching.marking import Marking, pressed
 from hmcs_console.teaching.recordings import Recordings
 from hmcs_console.teaching.swapping import Swapping
 from hmcs_console.teaching.wishes import Question

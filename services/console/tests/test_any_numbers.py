@@ -30,7 +30,7 @@ from hmcs_console.seeing.gathered import usable
 from hmcs_console.seeing.listening import wrong_with
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Seen
-from hmcs_console.teaching.takes import Take, opened
+from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.view import View
 from support.texts import EXAMPLE_OF
 

@@ -38,12 +38,12 @@ from hmcs.shown import plain
 from hmcs_console.operating import stopping
 from hmcs_console.order import Order
 from hmcs_console.seeing.listening import wrong_with
+from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Seen
+from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.serving.page import Page
 from hmcs_console.teaching import takeover
-from hmcs_console.teaching.marking import Marking
-from hmcs_console.teaching.takes import Take, opened
 from hmcs_console.view import View
 from support.texts import EXAMPLE_OF, HOSTILE, Path, fields, filled
 

@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from hmcs_console.operating.handles import Alive, Clutched, Grabbed, LetGo, Moved
-from hmcs_console.operating.hands import FLOOD
+from hmcs_console.serving.hands import FLOOD
 
 MakeCell = Callable[..., Any]
 HERE = np.array([0.6, 0.0, 0.5])

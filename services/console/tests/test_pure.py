@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hmcs.bus.messages import Label, Record, Step, Train
-from hmcs_console.drawing.geometry import box_edges, capsule, line, tube, turn_to, wxyz
-from hmcs_console.drawing.palette import UNKNOWN, color_of, css
 from hmcs_console.seeing.history import LONGEST_ROWS, columns, limits, written
 from hmcs_console.seeing.shadows import Agreement, Shadows
 from hmcs_console.seeing.trails import Trail
 from hmcs_console.serving.pace import next_rate_hz
+from hmcs_console.shapes.geometry import box_edges, capsule, line, tube, turn_to, wxyz
+from hmcs_console.shapes.palette import UNKNOWN, color_of, css
 from hmcs_console.teaching import wishes
 
 # --- pace -----------------------------------------------------------------------------------------

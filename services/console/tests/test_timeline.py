@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 from hmcs.bus.messages import Done, Outline, OutlineQuestion, SetLabels
 from hmcs.bus.session import RequestRefusedError
 from hmcs.recordings.stretches import LabelError
-from hmcs_console.drawing.palette import UNKNOWN, color_of
-from hmcs_console.teaching.takes import (
+from hmcs_console.seeing.takes import (
     Take,
     bands,
     hidden,
@@ -27,6 +26,7 @@ from hmcs_console.teaching.takes import (
     states_of,
     unlabeled,
 )
+from hmcs_console.shapes.palette import UNKNOWN, color_of
 from hmcs_console.teaching.timeline import TakePath, Timeline
 
 STATES = ("free", "in")

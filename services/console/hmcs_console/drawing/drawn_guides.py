@@ -9,13 +9,13 @@ import viser
 from numpy.typing import NDArray
 
 from hmcs.recognition.model import Model
-from hmcs_console.drawing.geometry import line
 from hmcs_console.drawing.layout import Layout, anchored, laid_out
 from hmcs_console.drawing.nodes import node
-from hmcs_console.drawing.palette import color_of, faint
 from hmcs_console.order import Order, order_of
 from hmcs_console.seeing.models import gesteme_of, guide_of
 from hmcs_console.seeing.seen import Picture
+from hmcs_console.shapes.geometry import line
+from hmcs_console.shapes.palette import color_of, faint
 
 _LEADING_M, _FAINT_M = 0.008, 0.003
 _NEAR_M = 1e-4

@@ -19,8 +19,8 @@ from viser.extras import ViserUrdf
 from viser.transforms import SO3
 
 from hmcs.motion.quaternions import product
-from hmcs_console.drawing.geometry import wxyz
 from hmcs_console.drawing.nodes import node_in
+from hmcs_console.shapes.geometry import wxyz
 
 _STILL = 1e-4
 """A joint that moved no more, rad or m, is not drawn anew: at a meter that is 0.1 mm."""

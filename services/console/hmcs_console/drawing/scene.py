@@ -13,11 +13,11 @@ from hmcs.bus.messages import FixtureState, RobotLooks, RobotState
 from hmcs.recognition.model import Model
 from hmcs_console.drawing.drawn_guides import DrawnGuides
 from hmcs_console.drawing.drawn_robot import DrawnRobot
-from hmcs_console.drawing.geometry import wxyz
-from hmcs_console.drawing.palette import DIRECTION, FORCE, Color
-from hmcs_console.drawing.pieces import Pieces, add_pieces, draw_pieces
 from hmcs_console.drawing.robot_model import joints_of, load_robot
 from hmcs_console.seeing.seen import Picture
+from hmcs_console.shapes.geometry import wxyz
+from hmcs_console.shapes.palette import DIRECTION, FORCE, Color
+from hmcs_console.shapes.pieces import Pieces, add_pieces, draw_pieces
 
 TRAILS_EVERY_S = 0.1
 """How often trails are drawn: a long one is more to send than all else that moves."""

@@ -10,9 +10,9 @@ import trimesh
 import viser
 
 from hmcs.task import ForbiddenRegion, Obstacle, Workspace
-from hmcs_console.drawing.geometry import box_edges, capsule, turn_to, wxyz
 from hmcs_console.drawing.nodes import node
-from hmcs_console.drawing.palette import FORBIDDEN, OBSTACLE, WORKSPACE
+from hmcs_console.shapes.geometry import box_edges, capsule, turn_to, wxyz
+from hmcs_console.shapes.palette import FORBIDDEN, OBSTACLE, WORKSPACE
 
 _THICKNESS_M = 0.002
 _SEE_THROUGH = 0.25

@@ -19,7 +19,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
 from hmcs.shown import plain
 from hmcs.task import Task, load_task
-from hmcs_console.drawing.geometry import Surface, tube
+from hmcs_console.shapes.geometry import Surface, tube
 
 MOST_MODELS, MOST_TOLD, MOST_MISSED = 256, 16, 256
 """Models that are kept, files that others told of, and hashes of which no file was found."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs_console.drawing.palette import Color
-from hmcs_console.drawing.pieces import Pieces
+from hmcs_console.shapes.palette import Color
+from hmcs_console.shapes.pieces import Pieces
 
 Points = NDArray[np.float64]
 

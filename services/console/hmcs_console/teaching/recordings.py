@@ -10,8 +10,8 @@ from hmcs.bus.session import Answer
 from hmcs.bus.verbs import OUTLINE, SET_LABELS
 from hmcs.errors import UserError
 from hmcs_console.asking import Asking
-from hmcs_console.teaching import takes
-from hmcs_console.teaching.takes import Take
+from hmcs_console.seeing import takes
+from hmcs_console.seeing.takes import Take
 
 READ_S = 30.0
 """A recorder has so long to read a recording."""

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from hmcs.shown import Markdown
-from hmcs_console.drawing.palette import FASTER, css
-from hmcs_console.drawing.pieces import add_pieces, draw_pieces
 from hmcs_console.seeing.history import limits
+from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, states_of
 from hmcs_console.serving.buttons import on_change, on_click
 from hmcs_console.serving.writing import Choice, add_words, name_of_curve, write
-from hmcs_console.teaching.takes import CHOSEN, Take, band_color, bands, lines, states_of
+from hmcs_console.shapes.palette import FASTER, css
+from hmcs_console.shapes.pieces import add_pieces, draw_pieces
 
 _HEIGHT_PX = 190
 _SLIDER_STEPS = 1000

@@ -8,7 +8,10 @@ from typing import NamedTuple
 import viser
 from viser import uplot
 
-from hmcs_console.drawing.palette import (
+from hmcs_console.seeing.history import SPAN_S, Rows, columns, limits
+from hmcs_console.seeing.hops import FAST, SLOW, hop_names
+from hmcs_console.serving.writing import name_of_curve
+from hmcs_console.shapes.palette import (
     DIRECTION,
     FASTER,
     FORCE,
@@ -18,9 +21,6 @@ from hmcs_console.drawing.palette import (
     color_of,
     css,
 )
-from hmcs_console.seeing.history import SPAN_S, Rows, columns, limits
-from hmcs_console.seeing.hops import FAST, SLOW, hop_names
-from hmcs_console.serving.writing import name_of_curve
 
 _HEIGHT_PX = 170
 _SHARE = (0.0, 1.05)

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
 from hmcs.shown import Markdown
+from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.shadows import Agreement
-from hmcs_console.teaching.marking import Marking
 
 MOST_NAMES = 12
 """Of a list of names so many are written out."""

@@ -24,8 +24,8 @@ from hmcs.recordings.stretches import (
     to_ns,
     told,
 )
-from hmcs_console.drawing.palette import UNKNOWN, Color, color_of
-from hmcs_console.drawing.pieces import Pieces
+from hmcs_console.shapes.palette import UNKNOWN, Color, color_of
+from hmcs_console.shapes.pieces import Pieces
 
 CHOSEN: Color = (60, 60, 60)
 MOST = 1e7

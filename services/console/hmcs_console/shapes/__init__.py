@@ -1,0 +1,1 @@
+"""What pages draw with: colors, edges, surfaces, and ways in pieces."""
