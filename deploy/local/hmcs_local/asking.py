@@ -48,7 +48,7 @@ class Replies(NamedTuple):
     """What everybody made of it."""
 
     each: tuple[Reply, ...]
-    """Sorted by name; everybody who is present, and whoever else has answered."""
+    """Sorted by name; all who are present, and any other that answered."""
     strangers: tuple[str, ...] = ()
     """Tokens of impossible names: no process bears one, and nobody is asked for it."""
 
@@ -91,7 +91,7 @@ def asked_of(
 
 
 def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:
-    """Let every robot of the cell stand, whoever drives it; return what each says.
+    """Let every robot of the cell stand, no matter who drives it; return what each says.
 
     A message that needs no answer goes to all of them, again and again while they are asked. All
     are asked at once, before anybody is looked for: no robot waits for another one, or for a token

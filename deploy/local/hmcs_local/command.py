@@ -419,7 +419,7 @@ def mark(
 
 @app.command()
 def stop(router: _Router = DEFAULT_ROUTER, cell: _Cell = "demo", secure: _Secure = None) -> None:
-    """Let every robot stand, whoever drives it, until its operator lets go and takes hold again.
+    """Let every robot stand, until its operator lets go and takes hold again.
 
     An operator that is played or simulated waits for `hmcs play`. All robots are asked at once. The
     exit code is 0 where every one that is present says that it stands, else 1.

@@ -1,6 +1,6 @@
 """How other `hmcs` commands reach a running `hmcs up`: a Unix socket only this user can open.
 
-Not over the bus: whoever may publish there must not be able to start commands here. One JSON line
+Not over the bus: who may publish there must not be able to start commands here. One JSON line
 asks, one JSON line answers:
 
     {"start": SERVICE, "command": [...] or null}    {"instance": NAME}

@@ -18,7 +18,7 @@ T = TypeVar("T")
 def interruptible() -> Iterator[None]:
     """Turn SIGTERM and SIGHUP into KeyboardInterrupt, as Ctrl-C does; a second one changes nothing.
 
-    Whoever stops the stack is not to be stopped half-way: its end is bounded by the graces.
+    Stopping the stack is not interrupted half-way: its end is bounded by the graces.
     """
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:

@@ -64,7 +64,7 @@ def init(cell: _Cell, folder: _Folder = DEFAULT_FOLDER, host: _Hosts = None) -> 
     console.print(f"{authority.folder}: the authority of cell {cell}, and its certificates")
     console.print(f"{file}: the router's configuration")
     console.print(
-        f"Keep {authority.folder / 'ca.key'} where nobody else comes: whoever has it can be "
+        f"Keep {authority.folder / 'ca.key'} where nobody else comes: who has it can be "
         f"anybody. Start the stack with `hmcs up --secure {authority.folder}`."
     )
 

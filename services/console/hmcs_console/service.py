@@ -160,7 +160,7 @@ class Console(Service):
     # --- what the page wishes; on its threads -----------------------------------------------------
 
     def stop(self) -> None:
-        """Let every robot stand: whoever operates here has let go, and the others are overruled."""
+        """Let every robot stand: operators of this page have let go, and others are overruled."""
         self.page.put(Stopped())
 
     def ask(self, question: Question) -> None:

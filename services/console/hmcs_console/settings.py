@@ -51,7 +51,7 @@ class ConsoleSettings(ServiceSettings):
         host = info.data.get("host")
         if token is None and host is not None and not is_loopback(host):
             raise ValueError(
-                f"host {host!r} can be reached from other machines, and whoever reaches the page "
+                f"host {host!r} can be reached from other machines, and who reaches the page "
                 "can move the robot: give a token, or a loopback host"
             )
         return token

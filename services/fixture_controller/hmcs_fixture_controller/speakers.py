@@ -54,8 +54,8 @@ class Speakers:
     def living(self, recognizer: str, now_s: float) -> list[str]:
         """Return the instances that run a recognizer, sorted.
 
-        Those are the members of its model, and whoever spoke for it last while it is present: a
-        recognizer of somebody's own may show its presence alone, or none at all.
+        Those are the members of its model, and the one that spoke for it last while it is present:
+        a recognizer of somebody's own may show its presence alone, or none at all.
         """
         living = {member.instance for member in self._members.get(recognizer, ())}
         spoke = self._spoke.get(recognizer)

@@ -1,4 +1,4 @@
-"""Running a study: its trials in parallel, here or on a cluster, the same whoever runs them."""
+"""Running a study: its trials in parallel, here or on a cluster, with the same rows."""
 
 from __future__ import annotations
 

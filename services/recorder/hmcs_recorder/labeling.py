@@ -1,4 +1,4 @@
-"""Recordings in the recorder's folder, outlined and labeled for whoever sees no files."""
+"""Recordings in the recorder's folder, outlined and labeled for processes that see no files."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The forbidden regions of the robot's own task: it keeps its tool out of them by itself.
 
-Whatever is commanded, and whoever died: the planes that part the tool from what is forbidden bound
-its motion at every control tick.
+Whatever is commanded, and whichever process died: the planes that part the tool from what is
+forbidden bound its motion at every control tick.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How an arm looks: its description and the meshes it names, for whoever draws it."""
+"""How an arm looks: its description and the meshes it names, to be drawn."""
 
 from __future__ import annotations
 

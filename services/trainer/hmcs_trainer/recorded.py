@@ -12,7 +12,7 @@ from hmcs.task import Task
 from hmcs_trainer.plausibility import Finding
 
 _WITH_A_TASK = ("input_device/", "robot/")
-"""What the metadata of whoever works on a task begins with."""
+"""Prefix of the metadata of processes that work on a task."""
 
 
 def recording_findings(task: Task, content: RecordingContent) -> Iterator[Finding]:

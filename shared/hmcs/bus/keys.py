@@ -115,7 +115,7 @@ class Keys:
 
     @property
     def stop_request(self) -> str:
-        """StopRequest, whoever watches over the cell to every robot."""
+        """StopRequest: anybody who watches over the cell to every robot."""
         return self._key("robot", "stop")
 
     @property
@@ -130,7 +130,7 @@ class Keys:
 
     @property
     def label(self) -> str:
-        """Label, whoever hears the operator to the recorder."""
+        """Label: any process that hears the operator to the recorder."""
         return self._key("input", "label")
 
     @property

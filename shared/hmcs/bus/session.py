@@ -317,7 +317,7 @@ class Bus:
     def ask(
         self, key: str, question: Message, answer_type: type[M], timeout_s: float = 1.0
     ) -> list[Answer[M]]:
-        """Ask whoever answers on `key` and return every reply that came within `timeout_s`.
+        """Ask all that answer on `key` and return every reply that came within `timeout_s`.
 
         Returns early once all have replied, at once where nobody is there. This process' own
         answers are left out. Replies that cannot be read are refused and counted.

@@ -1,6 +1,6 @@
 """Stretches of a recording, each one state of the task: checked, set anew, taken away.
 
-Stretches of one recording never overlap and stand in the order of time. Whoever edits them, on a
+Stretches of one recording never overlap and stand in the order of time. An editor of them, on a
 page or by a command, does it by these functions; no file is known here.
 """
 

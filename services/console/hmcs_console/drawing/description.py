@@ -1,8 +1,8 @@
 """A robot's description as it came over the wire, made anew of what is needed to draw it.
 
-Whoever answers for a robot may send anything: entities that read files, a tree of links without an
-end, numbers that are none, names that lead elsewhere. What is written here holds links, joints and
-what is seen of them, and names no file but those that came along.
+A process that answers for a robot may send anything: entities that read files, a tree of links
+without an end, numbers that are none, names that lead elsewhere. What is written here holds links,
+joints and what is seen of them, and names no file but those that came along.
 """
 
 from __future__ import annotations

@@ -33,9 +33,9 @@ class Stopping:
     def stop_everybody(self, robots: Iterable[Member], tell: Callable[[str], None]) -> None:
         """Have every robot stand; tell in a line what came of it for each of these.
 
-        One message goes to all, whoever is seen here and whoever hangs. Then each is asked, all at
-        once, so that one that does not answer holds up no other; it is told anew with every answer.
-        One that is being asked already is not asked twice.
+        One message goes to all robots, also to those that hang or are not seen here. Then each is
+        asked, all at once, so that one that does not answer holds up no other; the line is written
+        anew with every answer. One that is being asked already is not asked twice.
         """
         self._requests.put(StopRequest(reason=self._reason))
         wanted = sorted(robots)
@@ -69,7 +69,7 @@ class Stopping:
 
 def said(came: Mapping[Member, str]) -> Markdown:
     """Return what came of a stop, by robot, in words; empty where it is waited for."""
-    lines = [Markdown("**Stop**: whoever held a handle of this console has let go")]
+    lines = [Markdown("**Stop**: every handle of this console was let go")]
     if not came:
         lines.append(Markdown("no robot is there to be asked to stand"))
     lines += [

@@ -120,7 +120,7 @@ class Models:
         known = self._hashed.get(model_hash)
         if known is not None or model_hash in self._missed:
             return known
-        # Whoever tells of ever new models has no file read more often for it.
+        # A sender that names ever new models has no file read more often for it.
         if self._clock() - self._read_s < READ_EVERY_S:
             return None
         self._read_s = self._clock()

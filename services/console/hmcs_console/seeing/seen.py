@@ -42,7 +42,7 @@ _SILENT_S = 30.0
 
 
 class Picture(NamedTuple):
-    """One moment, for whoever draws it."""
+    """What is known at one moment, to be drawn."""
 
     robot: RobotState | None
     fixture: FixtureState | None

@@ -28,7 +28,7 @@ class Shadows:
         self._said[recognizer].append((clock, step, state))
 
     def forget(self, recognizer: str) -> None:
-        """Leave out what was said so far by whoever bore a name."""
+        """Leave out what was said so far under a name."""
         self._said.pop(recognizer, None)
 
     @property

@@ -1,6 +1,6 @@
 """Who may open the page: decided from the head of an HTTP request and where it came from.
 
-Whoever reaches the page can move the robot, so three things are kept out: people without the token,
+Who reaches the page can move the robot, so three things are kept out: people without the token,
 pages of other sites in the operator's own browser, which could otherwise open a connection to a
 loopback address, too, and names of other people's that lead to this machine.
 """

@@ -284,14 +284,14 @@ async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 
 async def _send(writer: asyncio.StreamWriter, data: bytes) -> None:
-    """Send; raises TimeoutError where whoever should read it does not."""
+    """Send; raises TimeoutError where its reader does not read."""
     writer.write(data)
     async with asyncio.timeout(_READ_WITHIN_S):
         await writer.drain()
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
-    """Close, after what is still to be sent; whoever does not read it in time is cut off."""
+    """Close, after what is still to be sent; a reader that is too slow is cut off."""
     writer.close()
     try:
         async with asyncio.timeout(_READ_WITHIN_S):

@@ -63,7 +63,7 @@ class Hands:
             self._handles.put(handle)
 
     def let_go(self) -> None:
-        """Release the handle, whoever holds it."""
+        """Release the handle, no matter who holds it."""
         self._follow(after(self.operating, Stopped()))
 
     def _follow(self, outcome: Outcome) -> None:

@@ -1,8 +1,8 @@
 """Where the page may be opened: addresses and names, told apart by what they are, not by letters.
 
 A name that somebody else controls may lead to this machine at any time (DNS rebinding), and a page
-that was opened under it would belong to whoever does. An address belongs to nobody, so it is enough
-that it is written as one; names have to be known.
+that was opened under it would belong to the one who does. An address belongs to nobody, so it is
+enough that it is written as one; names have to be known.
 """
 
 from __future__ import annotations

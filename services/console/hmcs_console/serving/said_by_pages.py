@@ -1,6 +1,6 @@
 """What a page of a browser may say: messages of the library it is served by, read strictly.
 
-Whoever was let in, or runs a program of theirs on this machine, may say anything. The library
+A viewer that was let in, or a program on this machine, may say anything. The library
 believes all of it: a message that is none ends a task with a traceback, one with other fields than
 a page has changes how it works, one that uploads fills the memory. So only what this page has use
 for is handed on, made anew from what was read.

@@ -25,7 +25,7 @@ LONGEST_WAIT_S = 300.0
 _MOST_DOUBLED = 10
 _FORGIVEN_S = 3600.0
 _SITE_BITS = 64
-"""Of an IPv6 address; whoever has one of a network has all of it."""
+"""Of an IPv6 address; who has one of a network has all of it."""
 
 
 class Sessions:

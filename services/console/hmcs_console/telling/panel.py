@@ -65,7 +65,9 @@ class Panel:
         self._gui = gui
         self._wishes = carried_out_by
         self._states = states
-        stop = gui.add_button("Stop", color="red", hint="Every robot stands, whoever drives it")
+        stop = gui.add_button(
+            "Stop", color="red", hint="Every robot stands, no matter who drives it"
+        )
         on_click(stop, carried_out_by.stop)
         self._answer = add_words(gui)
         tabs = gui.add_tab_group()

@@ -92,8 +92,8 @@ def operating() -> Markdown:
     return Markdown(
         "**Engage**: take the handle at the tool with the mouse; holding it is the dead-man's "
         "switch. **Let go**, and the robot stands. **Clutch** (C): the handle moves and the robot "
-        "does not, to reach farther. **Stop** (S): every robot stands, whoever drives it, until "
-        "its operator lets go and takes hold again. **Keep to** and **Scale** hold from when the "
+        "does not, to reach farther. **Stop** (S): every robot stands until its "
+        "operator lets go and takes hold again. **Keep to** and **Scale** hold from when the "
         "handle is next taken."
     )
 

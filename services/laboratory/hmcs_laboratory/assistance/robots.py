@@ -1,4 +1,4 @@
-"""The robot at the end of the loop: a lag, or the physics of whoever simulates it.
+"""The robot at the end of the loop: a lag, or the physics of its simulation.
 
 A distribution that simulates a robot in process names it in its `pyproject.toml`:
 

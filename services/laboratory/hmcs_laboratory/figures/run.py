@@ -1,4 +1,4 @@
-"""Making figures: in parallel, the same whoever makes them, and never half a file."""
+"""Making figures: in parallel, the same whatever the number of workers, and never half a file."""
 
 from __future__ import annotations
 

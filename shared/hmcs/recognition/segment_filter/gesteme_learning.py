@@ -236,7 +236,7 @@ def _left_right(phases: int, length: float) -> Array:
     """Initial, stay, advance and skip, each (phases,), for a mean length in steps.
 
     A phase lasts length / phases steps on average; the excess below covers faster and slower hands.
-    Whoever does not leave stays in the last phase.
+    A hand that does not leave stays in the last phase.
     """
     dwell = max(length / phases, 0.5)
     stay = max(1.0 - 1.0 / dwell, 0.0) + 0.08
