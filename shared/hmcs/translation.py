@@ -24,7 +24,7 @@ def step_of(message: messages.Step) -> Step:
 
 
 def belief_message(model: Model, recognition: Recognition, clock: str) -> messages.Belief:
-    """Return what is told of a recognition; `clock` is the boot of the input device."""
+    """Return the message of a recognition; `clock` is the boot of the input device."""
     belief = recognition.belief
     return messages.Belief(
         model_hash=model.hash,
@@ -45,7 +45,7 @@ def belief_message(model: Model, recognition: Recognition, clock: str) -> messag
 def evidence_message(
     model: Model, evidence: StepEvidence, clock: str, precision: Precision
 ) -> messages.Evidence:
-    """Return what is told of the evidence; `clock` is the boot of the input device."""
+    """Return the message of the evidence; `clock` is the boot of the input device."""
     names = model.gesteme_names
     return messages.Evidence(
         model_hash=model.hash,

@@ -1,4 +1,4 @@
-"""`hmcs up`: keeps a stack running and tells what happens in it, until it is told to stop."""
+"""`hmcs up`: keeps a stack running and tells what happens in it, until it is stopped."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def _draw_speed(ax: Axes, guided: Guided, at_s: Floats) -> None:
     recorded = [np.nan if tick.then is None else mm_s(tick.then.velocity) for tick in guided.ticks]
     _draw_both(ax, at_s, recorded, [mm_s(tick.now.velocity) for tick in guided.ticks])
     ax.set_ylabel("speed, mm/s")
-    ax.set_title("How fast the robot is told to go")
+    ax.set_title("Commanded speed of the robot")
 
 
 def _draw_both(ax: Axes, at_s: Floats, recorded: list[float], replayed: list[float]) -> None:

@@ -68,7 +68,7 @@ class Asking:
             except RequestRefusedError as error:
                 reason = str(error)
             except Exception as error:
-                # Whatever the wire does, who asked is told and the next question is asked.
+                # Whatever the wire does, the asker hears of it and the next question is asked.
                 reason = f"it could not be asked: {type(error).__name__}: {error}"
             else:
                 self._come.append(lambda: then(answers))
@@ -88,7 +88,7 @@ class Asking:
     ) -> None:
         """Ask one process to do something; tell in one line what came of it.
 
-        `failed` is told why it was not done, where it was not; by default `done` is.
+        `failed` receives why it was not done, where it was not; by default `done` is.
         """
         failed = failed or done
         if self._waiting == self._most_waiting:

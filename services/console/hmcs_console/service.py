@@ -1,4 +1,4 @@
-"""The service: what is heard is kept, what is kept is drawn, what the page does is told.
+"""The service: what is heard is kept, what is kept is drawn, what the page does is sent.
 
 Handlers of the bus only keep the newest. Drawing has a thread of its own, questions have theirs,
 and what viewers do is put down by the page's threads and taken here.
@@ -42,16 +42,16 @@ from hmcs_console.serving.hands import FLOOD, Hands
 from hmcs_console.serving.page import Page
 from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
-from hmcs_console.teaching import wishes
+from hmcs_console.teaching import requests
 from hmcs_console.teaching.recordings import Recordings
+from hmcs_console.teaching.requests import Question
 from hmcs_console.teaching.swapping import Swapping
-from hmcs_console.teaching.wishes import Question
 from hmcs_console.view import View
 
 TAKE_EVERY_S = 0.01
 """How often what viewers did is taken, and leases are looked at."""
 HANDLE_HZ = 30.0
-"""How often a held handle is told, however seldom the page is drawn: one that is silent for longer
+"""How often a held handle is sent, however seldom the page is drawn: one that is silent for longer
 than a few of these counts as let go."""
 _EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
@@ -157,7 +157,7 @@ class Console(Service):
         self._asking.close()
         self._stopping.close()
 
-    # --- what the page wishes; on its threads -----------------------------------------------------
+    # --- what the page asks for; on its threads ---------------------------------------------------
 
     def stop(self) -> None:
         """Let every robot stand: operators of this page have let go, and others are overruled."""
@@ -229,7 +229,7 @@ class Console(Service):
         self._requesting.request(question, self._tell, self._tell)
 
     def _label(self, state: str) -> None:
-        self._say(wishes.label(state, self._seen.clock, self._seen.step))
+        self._say(requests.label(state, self._seen.clock, self._seen.step))
 
     def _on_mark(self, clock: str, step: int) -> None:
         marking = pressed(self._seen.marking)

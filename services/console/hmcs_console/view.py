@@ -17,7 +17,7 @@ from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.page import Page
 from hmcs_console.teaching.timeline import TakePath
 from hmcs_console.telling.explained import Explained
-from hmcs_console.telling.panel import Panel, Wishes
+from hmcs_console.telling.panel import Panel, Requests
 from hmcs_console.telling.sounds import Sounds
 
 WORDS_EVERY_S = 0.2
@@ -33,7 +33,7 @@ class View:
         models: Models,
         task: Task | None,
         taught: str,
-        wishes: Wishes,
+        requests: Requests,
         lease_s: float,
         log: logging.Logger,
     ) -> None:
@@ -52,7 +52,7 @@ class View:
         self._training: TrainingProgress | None = None
         self._scene = Scene(server, log)
         self._path = TakePath(server.scene, np.array(start_m))
-        self._panel = Panel(server.gui, wishes, states, taught)
+        self._panel = Panel(server.gui, requests, states, taught)
         self._explained = Explained(server.gui, self._panel.operating, self._panel.rules)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)

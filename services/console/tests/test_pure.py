@@ -1,4 +1,4 @@
-"""Pace, colors, trails, history, shadows, geometry, and wishes."""
+"""Pace, colors, trails, history, shadows, geometry, and requests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hmcs_console.seeing.trails import Trail
 from hmcs_console.serving.pace import next_rate_hz
 from hmcs_console.shapes.geometry import box_edges, capsule, line, tube, turn_to, wxyz
 from hmcs_console.shapes.palette import UNKNOWN, color_of, css
-from hmcs_console.teaching import wishes
+from hmcs_console.teaching import requests
 
 # --- pace -----------------------------------------------------------------------------------------
 
@@ -208,12 +208,12 @@ def test_quaternions_are_reordered_for_the_page() -> None:
 
 def test_a_label_is_true_from_the_step_the_hand_is_making_now() -> None:
     step = Step(index=41, position=np.zeros(3), displacement=np.ones(3))
-    assert wishes.label("in", "clock", step) == Label(state="in", clock="clock", step=42)
-    assert wishes.label("in", "", None) == Label(state="in")
+    assert requests.label("in", "clock", step) == Label(state="in", clock="clock", step=42)
+    assert requests.label("in", "", None) == Label(state="in")
 
 
 def test_demonstrations_are_told_apart_by_commas_and_blanks() -> None:
-    asked = wishes.train(" mine ", "demo", "a.csv, b.csv\n c.hdf5", "")
+    asked = requests.train(" mine ", "demo", "a.csv, b.csv\n c.hdf5", "")
     assert (asked.service, asked.verb.name) == ("trainer", "train")
     assert asked.body == Train(
         model="mine", task="demo", demonstrations=("a.csv", "b.csv", "c.hdf5")
@@ -222,13 +222,13 @@ def test_demonstrations_are_told_apart_by_commas_and_blanks() -> None:
 
 def test_states_are_found_in_demonstrations_where_that_is_wished() -> None:
     for find_states in (False, True):
-        body = wishes.train("mine", "demo", "a.csv", "", find_states=find_states).body
+        body = requests.train("mine", "demo", "a.csv", "", find_states=find_states).body
         assert isinstance(body, Train)
         assert body.find_states is find_states
 
 
 def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:
-    assert wishes.record(True, " ").body == Record(on=True)
+    assert requests.record(True, " ").body == Record(on=True)
 
 
 @pytest.mark.parametrize(
@@ -243,5 +243,5 @@ def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:
 def test_a_training_nobody_could_carry_out_is_told_and_not_asked_for(
     model: str, task: str, files: str, told: str
 ) -> None:
-    with pytest.raises(wishes.WishError, match=told):
-        wishes.train(model, task, files, "")
+    with pytest.raises(requests.RequestError, match=told):
+        requests.train(model, task, files, "")

@@ -18,7 +18,7 @@ from hmcs.bus.messages import Belief, Done, Record, Step
 from hmcs.bus.service import UserError
 from hmcs.bus.session import RequestRefusedError
 from hmcs_console.operating.handles import Alive, Grabbed, LetGo, Moved
-from hmcs_console.teaching import wishes
+from hmcs_console.teaching import requests
 
 MakeCell = Callable[..., Any]
 HERE, THERE = np.array([0.6, 0.0, 0.5]), np.array([0.7, 0.0, 0.5])
@@ -153,19 +153,19 @@ def test_a_wish_is_carried_out_by_its_process_and_its_answer_is_shown(make_cell:
             return Done(detail="recording peg.hdf5")
         raise RequestRefusedError("nothing is being recorded")
 
-    cell.service.ask(wishes.record(True, "peg"))
+    cell.service.ask(requests.record(True, "peg"))
     cell.until(lambda: "no recorder is there" in cell.service.answer, "a hint")
     cell.other.answer("record", Record, record)
     cell.other.announce(cell.other.keys.presence("recorder", "x"))
 
     def asked_again() -> bool:
-        cell.service.ask(wishes.record(True, "peg"))
+        cell.service.ask(requests.record(True, "peg"))
         cell.wait(0.2)
         return bool(asked)
 
     cell.until(asked_again, "the presence")
     cell.until(lambda: cell.service.answer == "recording peg.hdf5", "the answer")
-    cell.service.ask(wishes.record(False, ""))
+    cell.service.ask(requests.record(False, ""))
     cell.until(lambda: "refused: nothing is" in cell.service.answer, "the refusal")
     assert (asked[0], asked[-1]) == (Record(on=True, name="peg"), Record(on=False))
 

@@ -7,7 +7,7 @@ from hmcs.fixtures.controller.interface import Fixture
 
 
 def command_of(fixture: Fixture, valid_for_ms: float) -> Command:
-    """Return what the robot is told."""
+    """Return the command to the robot."""
     return Command(
         twist=fixture.command_twist,
         valid_for_ns=round(valid_for_ms * 1e6),
@@ -16,7 +16,7 @@ def command_of(fixture: Fixture, valid_for_ms: float) -> Command:
 
 
 def state_of(fixture: Fixture) -> FixtureState:
-    """Return what everybody is told."""
+    """Return the state that everybody may read."""
     return FixtureState(
         law=fixture.law,
         model=fixture.model,

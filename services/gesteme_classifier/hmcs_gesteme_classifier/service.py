@@ -40,7 +40,7 @@ class GestemeClassifier(Service):
         self._peers = {bus.source.instance}
         self._living = {bus.source.instance}
         """Peers whose tokens the watch has told of, and not yet that they went."""
-        # One more than is scored: how the hand turns in a step is told by the step before it.
+        # One more than is scored: how the hand turns in a step follows from the step before it.
         memory_steps = layers_of(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
         self._recent: deque[FedStep] = deque(maxlen=memory_steps)

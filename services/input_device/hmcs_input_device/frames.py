@@ -1,4 +1,4 @@
-"""Device and robot may stand turned against each other: samples are told in the robot's axes."""
+"""Device and robot may stand turned against each other: samples are given in the robot's axes."""
 
 from __future__ import annotations
 

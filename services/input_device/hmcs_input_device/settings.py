@@ -140,7 +140,7 @@ class InputDeviceSettings(ServiceSettings):
     device: DeviceSettings = DeviceSettings()
     """How a gamepad, SpaceMouse, keyboard or mouse moves the hand."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """What a device of another distribution is told."""
+    """Settings of a device of another distribution."""
 
     @field_validator("task_frame_xyzw")
     @classmethod

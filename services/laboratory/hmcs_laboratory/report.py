@@ -1,4 +1,4 @@
-"""How a study is told: a table, one JSON object, and progress while it runs."""
+"""How a study is reported: a table, one JSON object, and progress while it runs."""
 
 from __future__ import annotations
 

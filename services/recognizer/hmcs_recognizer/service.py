@@ -1,6 +1,6 @@
 """The service: recognizers of any kind in one process, each a model of its own.
 
-It begins with the model it is told, if any, and takes more while it runs. The layered segment
+It begins with the model of its settings, if any, and takes more while it runs. The layered segment
 filter, too, runs here whole; as classifiers and a task HMM it is spread over processes.
 """
 

@@ -23,7 +23,7 @@ ASK_S = 0.5
 
 
 def preface_of(bus: Bus, models: Sequence[Path], log: logging.Logger) -> Preface:
-    """Return who is there, what they are told to do, and the models they work with."""
+    """Return who is there, their settings, and the models they work with."""
     members = {
         f"{answer.envelope.source.service}/{answer.envelope.source.instance}": answer.body
         for answer in ask_all(bus, DESCRIBE, Ask())
@@ -66,7 +66,7 @@ def ask_all(bus: Bus, verb: Verb[Q, A], question: Q) -> list[Answer[A]]:
 
 
 def _kept(places: Sequence[Path], log: logging.Logger) -> Iterator[tuple[str, bytes]]:
-    """Model files by names that are told apart; one that cannot be read is told and left out."""
+    """Model files, each under a name of its own; one that cannot be read is logged, left out."""
     taken: set[str] = set()
     for file in _files(places):
         try:

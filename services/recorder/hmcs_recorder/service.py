@@ -1,6 +1,6 @@
 """The service: everything that is published in the cell, into a file, and never in anybody's way.
 
-Where the disk is full, or the folder gone, the recording ends, which is told in health and log;
+Where the disk is full, or the folder gone, the recording ends, which health reports and log;
 what comes from then on is counted as lost, and recording goes on in a new file as soon as it can.
 Recordings are read, to set labels by, on a thread of its own meanwhile.
 """
@@ -231,7 +231,7 @@ class Recorder(Service):
             raise
 
     def _open(self, name: str, *, next_free: bool) -> Recording | None:
-        """Begin a file; None where that cannot be, which is told in health.
+        """Begin a file; None where that cannot be, which health reports.
 
         Raises UserError where the name is taken, unless the next one that is free will do.
         """

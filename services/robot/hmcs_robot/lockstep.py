@@ -1,4 +1,4 @@
-"""The simulated robot without a bus and without a clock: it moves when it is told to.
+"""The simulated robot without a bus and without a clock: it moves on command.
 
 For studies, which run at many times real speed: the very control and physics of the service.
 """

@@ -19,7 +19,7 @@ class Looks(NamedTuple):
 
     urdf: str
     joints: tuple[str, ...]
-    """Names in the URDF of the joints that are told of, in their order."""
+    """Names in the URDF of the joints that are reported, in their order."""
     files: dict[str, bytes]
     """Meshes, and the materials and textures beside them, by the name the URDF gives them."""
 

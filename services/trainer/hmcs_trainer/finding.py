@@ -106,7 +106,7 @@ def write_found(found: Found, task_file: Path) -> Iterator[str]:
 
 
 def _without_slips(source: Source, dead_zone_m: float) -> tuple[Source, list[str]]:
-    """The source without motions that lead nowhere, and what is told of them."""
+    """The source without motions that lead nowhere, and the remarks about them."""
     far = [
         each
         for each in source.demonstrations

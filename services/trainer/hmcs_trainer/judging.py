@@ -37,7 +37,7 @@ def judged(
     recognizer: str,
     progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Judgment:
-    """Leave each demonstration out in turn; `progress` is told how many of all are done."""
+    """Leave each demonstration out in turn; `progress` receives how many of all are done."""
     count, found = len(task.states), []
     chosen = np.unique(np.linspace(0, len(demonstrations) - 1, MOST).round().astype(int)).tolist()
     confusion = np.zeros((count, count), dtype=np.int64)

@@ -30,7 +30,7 @@ that can still be divided by."""
 
 
 class EstimatorSettings(NamedTuple):
-    """How classes are told apart."""
+    """How classes are distinguished."""
 
     kind: Literal["gaussian", "svm"] = "gaussian"
     """Gaussians of one variance, or a support vector machine for each class against all others."""

@@ -1,7 +1,7 @@
 """Castellani's hybrid: support vectors tell categories of force apart, an HMM the sub-tasks.
 
 Several sub-tasks may share a category; here categories are the gestemes of a task. Where not all
-demonstrations carry a force, categories are told apart by the direction of motion instead.
+demonstrations carry a force, categories are distinguished by the direction of motion instead.
 Shapes: M categories, K slots (a slot is one gesteme in one task state), F components, T steps.
 """
 
@@ -72,7 +72,7 @@ class ForceTask(NamedTuple):
     """What the hybrid knows."""
 
     observed: Literal["wrench", "direction"]
-    """What categories are told apart by: `direction` where a demonstration had no wrench."""
+    """What categories are distinguished by: `direction` where a demonstration had no wrench."""
     components: tuple[int, ...]
     """Indices of the components looked at, of the wrench or of the position."""
     center: Array

@@ -1,4 +1,4 @@
-"""From bytes that arrived to messages that may be handled: refused, lost and late are told here."""
+"""From bytes that arrived to messages that may be handled; counts what is refused, lost or late."""
 
 from __future__ import annotations
 

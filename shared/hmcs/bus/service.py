@@ -226,7 +226,7 @@ class _Life:
         self._counted = (now_s, now)
 
     def _health(self, _: Ask) -> Health:
-        # Beside the loop, so that one that hangs is told as well.
+        # Beside the loop, so that one that hangs is reported as well.
         try:
             healthy, detail = self._bus.in_loop(self._service.health)
         except LoopHangsError as error:

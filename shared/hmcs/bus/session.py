@@ -260,7 +260,7 @@ class Bus:
 
         For observers who keep whatever there is and are in no hurry: they are handed what came
         together, every `every_s`, which costs a fraction of waking up for each. What finds no
-        place to wait is told by the gap in its numbers, as all losses are.
+        place to wait shows in the gap in its numbers, as all losses are.
         """
         check_right(self.rights, "hears", key)
         listening = Listening(handler, lambda: self._reader.overflowed(key))
@@ -322,7 +322,7 @@ class Bus:
         Returns early once all have replied, at once where nobody is there. This process' own
         answers are left out. Replies that cannot be read are refused and counted.
         Raises RequestRefusedError where `key` names one process and that refused, and StoppedError
-        where the process is told to stop meanwhile.
+        where the process is stopped meanwhile.
         """
         check_right(self.rights, "asks", key)
         payload = encode(question, self._stamps(key)())

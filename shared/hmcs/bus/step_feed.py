@@ -56,7 +56,7 @@ class StepFeed:
     ) -> None:
         """Hand every step to `on_step`.
 
-        `on_restart` is told the index of the step that comes next when that step does not follow
+        `on_restart` receives the index of the step that comes next when that step does not follow
         the one before: at the beginning, after a new start of the input device, and after a gap
         that could not be filled. Before it up to `memory_steps` earlier steps are fetched.
         """

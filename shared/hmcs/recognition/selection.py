@@ -61,7 +61,7 @@ def choose(
 
     A demonstration is left out only where all gestemes are still demonstrated without it. Of
     choices that are as good (within the best one's standard error) the first in the order given
-    wins, so put what is cheaper first. `progress` is told how many of all fits are done.
+    wins, so put what is cheaper first. `progress` receives how many of all fits are done.
 
     Raises LearningError when no demonstration can be left out; UserError for an unknown setting
     or a value that does not fit.

@@ -18,7 +18,7 @@ from hmcs.recordings.ticks import Did
 COMPARED = ("probabilities", "unknown", "log_likelihood", "mean_log_likelihood", "segment_start")
 """What makes two beliefs the same, bit by bit."""
 CLOSE = 0.02
-"""Factors that differ by less are told as the same."""
+"""Factors that differ by less count as the same."""
 SAME_EVENT_S = 1.0
 """A fixture that lets go, or takes hold, farther apart in time does so for other reasons."""
 

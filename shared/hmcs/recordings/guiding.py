@@ -55,7 +55,7 @@ def guided(
 
     Every sample, step and position of the robot comes when it was recorded; a belief comes when the
     recorded one of its step came, or with its step where there was none. Rules and guides are those
-    of the replayed model, safeguards those of the recorded fixture controller. `progress` is told
+    of the replayed model, safeguards those of the recorded fixture controller. `progress` receives
     the share done. Raises RecordingError where messages are of another version of the contract, and
     RegionError for a forbidden region that cannot be.
     """

@@ -78,7 +78,7 @@ def kept_model(content: RecordingContent) -> Model:
 def replayed(
     content: RecordingContent, model: Model, progress: Callable[[float], None] = lambda _: None
 ) -> Replay:
-    """Return what a model's recognizer believes of a recording; `progress` is told the share done.
+    """Return what a model's recognizer believes of a recording; `progress` receives the share done.
 
     Where the recording has evidence of this very model, evidence is rounded as it was on its way,
     and what was missing at a step is missing again. Raises RecordingError where there are no steps

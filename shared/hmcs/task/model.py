@@ -123,7 +123,7 @@ def contradictions(draft: Draft) -> list[Contradiction]:
     if draft.complete:
         # Which name is nearest is looked for among all: that takes its time.
         strangers = list(islice(_unknown_names(draft), _MOST_UNKNOWN))
-        # A misspelled name hides a way; what can be reached is told once the names are right.
+        # A misspelled name hides a way; what can be reached is reported once the names are right.
         found += strangers or _unreachable(draft)
     return found
 

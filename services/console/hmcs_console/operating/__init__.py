@@ -1,1 +1,1 @@
-"""From what pages do with their handles to what the input device is told."""
+"""From what pages do with their handles to the handle that the input device hears."""

@@ -1,4 +1,4 @@
-"""From what pages do with their handles to what the input device is told. No wire but its message.
+"""From what pages do with their handles to the one handle that the input device hears.
 
 One page operates at a time. Holding the handle is the dead-man's switch: a page that lets go, goes
 away, is stopped, or gives no sign of life for as long as the lease lasts has released it, and has
@@ -6,8 +6,8 @@ to grab the handle anew.
 
 A page may keep its handle to a plane, and scale it. A change of that while the handle is held holds
 from the next time it is taken: its arrows cannot change while one of them is dragged, so what is
-drawn and what is told would not be the same. Positions are told from where it was taken, so that
-none depends on what came between.
+drawn and what is sent would not be the same. Positions are measured from where it was taken, so
+that none depends on what came between.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hmcs_console.operating.lease import Lease
 from hmcs_console.operating.rules import FREE, Grip, Rule, led_to
 
 SETTLE_S = 0.03
-"""So long a grabbed handle is told as released: where two of them wait, only the newer is heard."""
+"""So long a grabbed handle is sent as released: where two of them wait, only the newer is heard."""
 PEDAL_S = 0.3
 """The page says again and again that its pedal is down; after so long without it, it is up."""
 
@@ -99,7 +99,7 @@ class Operating(NamedTuple):
     """How the pages operate now."""
 
     console: str
-    """Name of this console: operators are told apart by it and the number of their page."""
+    """Name of this console: operators are distinguished by it and the number of their page."""
     lease: Lease = leases.FREE
     position: NDArray[np.float64] = np.zeros(3)
     """Where the operator's handle leads to, m, base frame, shape (3,)."""
@@ -110,7 +110,7 @@ class Operating(NamedTuple):
     clutched: frozenset[int] = frozenset()
     """Pages whose clutch is pressed."""
     held_from_s: float = 0.0
-    """The handle is told to be held from then on."""
+    """The handle counts as held from then on."""
     pedal_until_s: float = 0.0
 
     @property

@@ -1,6 +1,6 @@
 """How long a hop takes: what one cause makes of itself, by the clock of this one observer.
 
-Messages of one origin are told apart by nothing else, and their times are those of their arrival
+Messages of one origin are distinguished by nothing else, and their times are those of their arrival
 here. So no clocks are compared across hosts; what differs between the ways to this observer counts
 in, for better or worse.
 """

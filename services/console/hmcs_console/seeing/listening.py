@@ -25,7 +25,7 @@ class Listening:
     def __init__(
         self, bus: Bus, seen: Seen, log: logging.Logger, marked: Callable[[str, int], None]
     ) -> None:
-        """Begin to listen; `marked` is told clock and number of each step the pedal marks."""
+        """Begin to listen; `marked` is called with clock and number of steps the pedal marks."""
         self._marked = marked
         self._bus = bus
         self._seen = seen

@@ -135,7 +135,7 @@ class Models:
 
     def _read_files(self) -> None:
         for place in (*self._places, *self._told):
-            # Paths are told as another process sees them, and files may be half written.
+            # Paths are given as another process sees them, and files may be half written.
             with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):
                 for file in model_files(place):
                     with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):

@@ -25,7 +25,7 @@ class Presence:
     def __init__(
         self, bus: Bus, seen: Seen, log: logging.Logger, came: Callable[[Member], None]
     ) -> None:
-        """Begin to follow them; `came` is told of each process that comes, but of this one."""
+        """Begin to follow them; `came` is called with each process that comes, but of this one."""
         self._bus = bus
         self._seen = seen
         self._limited = RateLimitedLog(log)

@@ -35,7 +35,7 @@ NS_PER_S = 1_000_000_000
 FORGOTTEN_S = 2.0
 """What was not said again for so long is not shown as what is."""
 UNRUN_AFTER_S = 1.0
-"""A recognizer that nobody has run for so long is told as such; a swap has no such gap."""
+"""A recognizer that nobody has run for so long is shown as such; a swap has no such gap."""
 MOST_RECOGNIZERS = 32
 """That are heard at once; another is refused until one of those is silent and run by nobody."""
 _SILENT_S = 30.0

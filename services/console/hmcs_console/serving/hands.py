@@ -1,4 +1,4 @@
-"""What viewers do with their pages is carried out: handles are told, floods are held back."""
+"""What viewers do with their pages is carried out: handles are sent, floods are held back."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ READ_S = 30.0
 
 
 class Recordings:
-    """What is shown of recordings; wishes come on the page's threads, all else on the bus' own."""
+    """What is shown of recordings; requests come on the page's threads, the rest on the bus'."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Recordings:
         self.take = Take()
         """What is shown now."""
 
-    # --- what the page wishes; on its threads -----------------------------------------------------
+    # --- what the page asks for; on its threads ---------------------------------------------------
 
     def open(self, name: str) -> None:
         """Show a recording, the newest where `name` is empty; it is read anew."""

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from hmcs_console.asking import first_of
 from hmcs_console.seeing.seen import Seen
 from hmcs_console.seeing.shadows import Agreement
-from hmcs_console.teaching import takeover, wishes
+from hmcs_console.teaching import requests, takeover
+from hmcs_console.teaching.requests import Question
 from hmcs_console.teaching.takeover import Advance, Followed, Takeover
-from hmcs_console.teaching.wishes import Question
 
 Told = Callable[[str], None]
 
@@ -21,8 +21,8 @@ class Swapping:
     def __init__(
         self, seen: Seen, request: Callable[[Question, Told, Told], None], compare_s: float
     ) -> None:
-        """Ask with `request`, which is given a question, who is told what is so now, and who is
-        told why it was not carried out."""
+        """Ask with `request`: of a question, what to call with its answer, and what to call with
+        the reason why it was not carried out."""
         self._seen = seen
         self._request = request
         self._compare_s = compare_s
@@ -46,7 +46,7 @@ class Swapping:
         if now is not None and now.under_way:
             self._advance(takeover.called_off(now))
         elif self._followed.before:
-            question = wishes.activate(self._followed.before)
+            question = requests.activate(self._followed.before)
             self._request(question, self._tell, self._tell)
         else:
             self._tell("no other recognizer was active before")

@@ -13,7 +13,7 @@ from hmcs.bus.messages import LoadModel, TrainingProgress
 from hmcs.bus.verbs import LOAD_MODEL
 from hmcs.shown import Markdown
 from hmcs_console.seeing.shadows import Agreement
-from hmcs_console.teaching.wishes import Question, activate
+from hmcs_console.teaching.requests import Question, activate
 
 Stage = Literal["loading", "comparing", "activating", "done", "failed"]
 _LINES = Markdown("  \n")
@@ -51,7 +51,7 @@ class Advance(NamedTuple):
 
     takeover: Takeover
     ask: Question | None = None
-    """To be asked now; its answer is what `answered` or `refused` is told."""
+    """To be asked now; its answer is what `answered` or `refused` receives."""
 
 
 class Followed(NamedTuple):

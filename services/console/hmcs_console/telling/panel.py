@@ -11,16 +11,16 @@ from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.buttons import on_change, on_click
 from hmcs_console.serving.inbox import pressed_by
 from hmcs_console.serving.writing import Choice, add_words, write
-from hmcs_console.teaching import wishes
+from hmcs_console.teaching import requests
+from hmcs_console.teaching.requests import Question
 from hmcs_console.teaching.timeline import Editing, Timeline
-from hmcs_console.teaching.wishes import Question
 from hmcs_console.telling import words
 from hmcs_console.telling.plots import Plots
 
 _LONGEST_PATH = 4096
 
 
-class Wishes(Protocol):
+class Requests(Protocol):
     """Who carries out what is asked for on the page; called on the page's threads."""
 
     @property
@@ -60,10 +60,10 @@ class Panel:
     """The panel; made and drawn on one thread, asked for things on the page's."""
 
     def __init__(
-        self, gui: viser.GuiApi, carried_out_by: Wishes, states: tuple[str, ...], task: str
+        self, gui: viser.GuiApi, carried_out_by: Requests, states: tuple[str, ...], task: str
     ) -> None:
         self._gui = gui
-        self._wishes = carried_out_by
+        self._requests = carried_out_by
         self._states = states
         stop = gui.add_button(
             "Stop", color="red", hint="Every robot stands, no matter who drives it"
@@ -125,7 +125,7 @@ class Panel:
             on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
             pedal = gui.add_checkbox(
                 "Pedal begins the next part",
-                self._wishes.marks_by_pedal,
+                self._requests.marks_by_pedal,
                 hint="Press it where each part begins, and once more where the last one ends",
             )
             self._marking = add_words(gui)
@@ -136,7 +136,7 @@ class Panel:
             kind = gui.add_text("Recognizer", "", hint="The default one where it is empty")
             find_states = gui.add_checkbox("Find states (no labels needed)", False)
             train = gui.add_button("Train")
-            on_click(gui.add_button("Cancel"), lambda: self._wishes.ask(wishes.cancel()))
+            on_click(gui.add_button("Cancel"), lambda: self._requests.ask(requests.cancel()))
             self._progress = gui.add_progress_bar(0.0)
             self._training = add_words(gui)
             on_click(
@@ -144,47 +144,47 @@ class Panel:
                     "Activate what was trained",
                     hint="After it ran for a while beside the one that is active",
                 ),
-                self._wishes.take_over,
+                self._requests.take_over,
             )
             on_click(
                 gui.add_button("Activate now", hint="Without comparing it any longer"),
-                self._wishes.activate_now,
+                self._requests.activate_now,
             )
             self._takeover = add_words(gui)
 
         async def change_recording(event: viser.GuiEvent[Any]) -> None:
             with pressed_by(event.client_id):
-                self._wishes.ask(wishes.record(event.target.value == "Begin", name.value))
+                self._requests.ask(requests.record(event.target.value == "Begin", name.value))
 
         record.on_click(change_recording)
-        on_change(pedal, self._wishes.mark_by_pedal)
+        on_change(pedal, self._requests.mark_by_pedal)
 
         def ask_to_train() -> None:
             try:
-                question = wishes.train(
+                question = requests.train(
                     model.value,
                     task_name.value,
                     self._files.value,
                     kind.value,
                     find_states=find_states.value,
                 )
-            except wishes.WishError as error:
-                self._wishes.refuse(str(error))
+            except requests.RequestError as error:
+                self._requests.refuse(str(error))
             else:
-                self._wishes.ask(question)
+                self._requests.ask(question)
 
         on_click(train, ask_to_train)
 
     def _mark(self) -> None:
-        self._wishes.label(self._label.chosen)
+        self._requests.label(self._label.chosen)
 
     def _activate(self) -> None:
         if self._choice.chosen:
-            self._wishes.ask(wishes.activate(self._choice.chosen))
+            self._requests.ask(requests.activate(self._choice.chosen))
 
     def _use_for_training(self, path: str) -> None:
         if plain(path, _LONGEST_PATH) != path:
-            self._wishes.refuse("a recording whose path cannot be shown is not trained from")
+            self._requests.refuse("a recording whose path cannot be shown is not trained from")
             return
         there = [file for file in self._files.value.split(", ") if file]
         if path and path not in there:

@@ -55,7 +55,7 @@ class DeviceSource:
         return self._gate.trouble
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
-        """Return the hand now; at rest, with the dead-man up, before it is told to play."""
+        """Return the hand now; at rest, with the dead-man up, before it was asked to play."""
         now_s = self._clock()
         since_s, self._asked_s = now_s - self._asked_s, now_s
         reading, trouble = self._read()

@@ -119,7 +119,7 @@ def spacemice() -> list[str]:
 
 def _connected(pyspacemouse: Any) -> list[str]:
     try:
-        # One that has several HID interfaces is told several times.
+        # One that has several HID interfaces is listed several times.
         return list(dict.fromkeys(pyspacemouse.get_connected_devices()))
     except RuntimeError as error:
         raise NotInstalledError(

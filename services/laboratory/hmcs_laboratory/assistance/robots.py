@@ -23,7 +23,7 @@ LAG = "lag"
 
 
 class SimulatedRobot(Protocol):
-    """A robot that moves when it is told to."""
+    """A robot that moves on command."""
 
     @property
     def position(self) -> Array:

@@ -31,7 +31,7 @@ OURS = "hmcs-gestemes"
 FLOORED = ("od-hmm", "md-hmm", "fft-hmm")
 UNFLOORED = tuple(f"{name}-no-floor" for name in FLOORED)
 ALIKE = 0.02
-"""Methods whose mean shares differ by less are told to be alike."""
+"""Methods whose mean shares differ by less count as alike."""
 NAMES = {"od-hmm": "OD", "md-hmm": "MD", "fft-hmm": "FFT", OURS: "ours"}
 
 
@@ -199,7 +199,7 @@ def _number(row: Row, name: str) -> float:
 
 
 def _shown(settings: CurvesSettings) -> Kind:
-    """The kind of gestemes that is told of."""
+    """The kind of gestemes that is described."""
     return "mixed" if "mixed" in settings.kinds else settings.kinds[0]
 
 

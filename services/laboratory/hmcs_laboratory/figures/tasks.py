@@ -62,7 +62,7 @@ class LayeredSettings(StudySettings):
     any_state: Share = 1e-6
     """In each step the task goes to any state whatever with this probability."""
     eager_any_state: Share = 1e-3
-    """The same in a second layered HMM, which is told of but not drawn."""
+    """The same in a second layered HMM, which is measured but not drawn."""
 
     def layered(self, any_state: float) -> LayeredHmmSettings:
         """Return the settings of the layered HMM: as in the thesis, restarted where told to."""

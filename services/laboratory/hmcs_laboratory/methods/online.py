@@ -29,7 +29,7 @@ class OnlineMethod:
     learn: Callable[[Task, Sequence[Demonstration], np.random.Generator], Fresh]
     """Raises UserError where its library is not installed."""
     marked: bool = False
-    """Whether it is told where a segment begins; all others have to find out."""
+    """Whether it is given where a segment begins; all others have to find out."""
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class WholeMethod:
     """Has what the library imports or compiles on first use done, so that it is not timed."""
     whole_only: bool = False
     """Whether it compares whole motions only. To classify beginnings it learns from beginnings of
-    the same share: it is told how much it sees, others are not."""
+    the same share: it is given how much it sees, others are not."""
 
 
 def measured_on(

@@ -70,7 +70,7 @@ class DirectionsSettings(TaskSettings):
     dimensions: Annotated[int, Field(ge=2, le=3)] = 3
     demonstrations: Count = 6
     what: Annotated[tuple[What, ...], Field(min_length=1)] = ("number", "following")
-    """How many directions are found, or how soon a change of direction is told."""
+    """How many directions are found, or how soon a change of direction is noticed."""
     noise: tuple[NotNegative, ...] = (0.15, 0.3)
     """κ of (3.3)."""
     tasks: Count = 10
@@ -80,7 +80,7 @@ class DirectionsSettings(TaskSettings):
     followed_lines: Annotated[int, Field(ge=2)] = 4
     """Of a task that is followed."""
     sure: Share = 0.95
-    """A change is told when the direction after it is more probable than this."""
+    """A change is reported when the direction after it is more probable than this."""
     methods: tuple[Name, ...] = ()
     """All where none is named."""
 
@@ -283,7 +283,7 @@ _FOLLOWING: Mapping[Following, Callable[[TaskSet, np.random.Generator], tuple[Ar
 
 DIRECTIONS = Study(
     "directions",
-    "how many directions a task of lines has, and how soon a change of direction is told",
+    "how many directions a task of lines has, and how soon a change of direction is noticed",
     "Aarno 2007, chapter 3",
     DirectionsSettings,
     directions_trial,

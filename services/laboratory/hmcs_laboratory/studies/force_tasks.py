@@ -115,7 +115,7 @@ def recognized(run: Run, scenario: Scenario, taught: Taught) -> dict[str, float]
     ends_m = taught.ends_m if ends_m is None else ends_m
     progress_m = np.maximum.accumulate(run.progress_m)
     true = [state_at(states, ends_m, float(progress_m[at])) for at in run.step_at]
-    # What is believed after a step is told from the next sample on.
+    # What is believed after a step is reported from the next sample on.
     after = np.minimum(run.step_at + 1, len(run.states) - 1)
     believed = [run.states[at] for at in after]
     scores = score(_gestemes(taught.task, true), _gestemes(taught.task, believed))

@@ -1,4 +1,4 @@
-"""What may be asked for on the page; each wish is one message or one question of the contract."""
+"""What may be asked for on the page; each is one message or question of the contract."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from hmcs.bus.verbs import ACTIVATE, CANCEL, RECORD, TRAIN, Verb
 from hmcs.errors import UserError
 
 
-class WishError(UserError):
-    """A wish that nobody could carry out; says what is wrong with it."""
+class RequestError(UserError):
+    """A request that nobody could carry out; says what is wrong with it."""
 
 
 class Question(NamedTuple):
-    """A wish that a process carries out."""
+    """A request that a process carries out."""
 
     service: str
     verb: Verb[Any, Done]
@@ -33,32 +33,34 @@ class Question(NamedTuple):
 
 
 def record(on: bool, name: str) -> Question:
-    """Return the wish to begin or to end a recording."""
+    """Return the request to begin or to end a recording."""
     return Question("recorder", RECORD, Record(on=on, name=name.strip()))
 
 
 def activate(recognizer: str) -> Question:
-    """Return the wish that the fixture follows a recognizer."""
+    """Return the request that the fixture follows a recognizer."""
     return Question("fixture_controller", ACTIVATE, ActivateRecognizer(model=recognizer))
 
 
 def train(
     model: str, task: str, demonstrations: str, recognizer: str, *, find_states: bool = False
 ) -> Question:
-    """Return the wish for a training; demonstrations are told apart by commas or blanks.
+    """Return the request for a training; demonstrations are separated by commas or blanks.
 
-    Raises WishError where there is no name for the model, or one that cannot be, no task, or
+    Raises RequestError where there is no name for the model, or one that cannot be, no task, or
     nothing to learn from.
     """
     files = tuple(part for part in re.split(r"[,\s]+", demonstrations) if part)
     try:
         check_name("model", model.strip())
     except KeyNameError as error:
-        raise WishError(f"nothing is trained: {error}") from error
+        raise RequestError(f"nothing is trained: {error}") from error
     if not task.strip():
-        raise WishError("nothing is trained: name a task that comes along, or a task file")
+        raise RequestError("nothing is trained: name a task that comes along, or a task file")
     if not files:
-        raise WishError("nothing is trained: name the recordings to learn from, e.g. take-1.mcap")
+        raise RequestError(
+            "nothing is trained: name the recordings to learn from, e.g. take-1.mcap"
+        )
     return Question(
         "trainer",
         TRAIN,
@@ -73,7 +75,7 @@ def train(
 
 
 def cancel() -> Question:
-    """Return the wish that what is being trained is not trained any further."""
+    """Return the request that what is being trained is not trained any further."""
     return Question("trainer", CANCEL, Ask())
 
 
