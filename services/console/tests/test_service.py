@@ -80,22 +80,22 @@ def test_who_brings_the_token_is_let_in_and_nobody_else(make_cell: MakeCell) -> 
 def test_a_held_handle_is_told_often_however_seldom_the_page_is_drawn(make_cell: MakeCell) -> None:
     cell = make_cell(lease_s=2.0, rate_hz=2)
     grab(cell)
-    count = len(cell.handles)
-    cell.wait(0.9)
-    told = cell.handles[count:]
-    assert all(handle.dead_man for _, handle in told)
-    assert len(told) > 15
+    count, began_s = len(cell.handles), time.monotonic()
+    cell.until(lambda: len(cell.handles) - count > 15, "the handle again and again")
+    # Drawn twice a second, the page would have needed eight.
+    assert time.monotonic() - began_s < 6.0
+    assert all(handle.dead_man for _, handle in cell.handles[count:])
 
 
 def test_a_held_handle_is_told_at_a_rate_and_released_once_the_lease_lapses(
     make_cell: MakeCell,
 ) -> None:
-    cell = make_cell(lease_s=0.4, rate_hz=50)
+    cell = make_cell(lease_s=1.5, rate_hz=50)
     grab(cell)
     assert not cell.handles[0][1].dead_man
     began_s = time.monotonic()
     cell.until(lambda: not cell.handles[-1][1].dead_man, "the release")
-    assert time.monotonic() - began_s < 2.0
+    assert 1.0 < time.monotonic() - began_s < 10.0
     held = [handle for _, handle in cell.handles if handle.dead_man]
     assert len(held) > 5
     assert {handle.operator for handle in held} == {"x-page-1"}
