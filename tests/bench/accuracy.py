@@ -13,7 +13,7 @@ from hmcs.motion.lasa import read_drawing
 from hmcs.motion.steps import DeadZone
 from hmcs.recognition.learning import learn
 from hmcs.recognition.scoring import NONE, Scores, midway_labels, score
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs.task import load_task
 
 ACCURACY = 0.985
@@ -62,7 +62,7 @@ def held_out(numbers: tuple[int, int]) -> Scores:
         np.array(task.robot.tool_start_m),
     )
     model = learn(task, taught)
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     zone, ends, believed, here = DeadZone(task.dead_zone_m), [], [], 0
     for sample, position in enumerate(performed.positions):
         step = zone.push(position)

@@ -24,7 +24,7 @@ from hmcs.bus.wire import decode, encode
 from hmcs.fixtures.controller.controller import Controller, Safeguards
 from hmcs.motion.demonstrations import read_csv
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.segment_filter.recognizer import TaskRecognizer, bank_of
+from hmcs.recognition.segment_filter.recognizer import TaskFilter, bank_of
 from hmcs.translation import sample_of, step_of
 from hmcs_fixture_controller.translation import command_of, state_of
 from hmcs_input_device.playback import Passes, Playback
@@ -95,7 +95,7 @@ def classifier(to: int, path: Path) -> None:
 def task(to: int, path: Path, inputs: int) -> None:
     """Make a Belief of each step's Evidence as soon as every gesteme is covered."""
     model = load_model(path)
-    recognizer = TaskRecognizer(model)
+    recognizer = TaskFilter(model)
     gathering = Gathering(recognizer.gestemes, LONG_NS)
     arrived: SimpleQueue[Frame] = SimpleQueue()
     server, port = listen()

@@ -12,7 +12,7 @@ from hmcs.bus.messages import Belief
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from support.hand import Scene, told
 
 PATIENT = ("--deadline-ms", "1000")
@@ -47,7 +47,7 @@ def test_belief_is_the_same_over_the_bus_as_in_process(
     scene: Scene, model_file: Path, model: Model, steps: list[Step], precision: str, to: float
 ) -> None:
     flags = ("--model", model_file, "--precision", precision)
-    stack, recognizer = scene.stack, LayeredRecognizer(model)
+    stack, recognizer = scene.stack, SegmentFilterRecognizer(model)
     stack.until_ready(
         stack.start("gesteme_classifier", "a", *flags),
         stack.start("gesteme_classifier", "b", *flags),
@@ -61,7 +61,7 @@ def test_belief_is_the_same_over_the_bus_as_in_process(
 def test_belief_stays_the_same_when_classifiers_are_swapped(
     scene: Scene, model_file: Path, model: Model, steps: list[Step]
 ) -> None:
-    stack, recognizer = scene.stack, LayeredRecognizer(model)
+    stack, recognizer = scene.stack, SegmentFilterRecognizer(model)
     old = [stack.start("gesteme_classifier", name, "--model", model_file) for name in "ab"]
     stack.until_ready(*old, stack.start("task_hmm", "t", "--model", model_file, *PATIENT))
     scene.in_step(steps[:100])
@@ -96,7 +96,7 @@ def test_a_task_hmm_that_comes_back_catches_up(
 
     # What it can fetch is a window of steps; where that is all there was, nothing is forgotten.
     remembered = steps[max(0, made - window) : made]
-    recognizer = LayeredRecognizer(model, anywhere=made > window)
+    recognizer = SegmentFilterRecognizer(model, anywhere=made > window)
     for step in remembered:
         recognizer.step(step)
     expected = [recognizer.step(step) for step in steps[made : made + 50]]

@@ -11,7 +11,7 @@ import psutil
 from hmcs.bus.messages import Belief, Evidence
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
 
@@ -22,7 +22,7 @@ PATIENT = ("--deadline-ms", 1e3 * DEADLINE_S)
 
 
 def in_process(model: Model, steps: list[Step]) -> list[np.ndarray]:
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     return [recognizer.step(step).belief.states for step in steps]
 
 

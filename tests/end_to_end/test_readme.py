@@ -12,7 +12,7 @@ import numpy as np
 from hmcs.bus.messages import ActivateRecognizer, Done
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
 from support.stack import DEADLINE_S, Stack, clean_environment
@@ -58,7 +58,7 @@ def test_the_recognizer_of_the_how_to_recognizes_and_can_be_activated(
     stack.until_ready(mine, fixture)
 
     scene.in_step(steps[:250])
-    best = LayeredRecognizer(model)
+    best = SegmentFilterRecognizer(model)
     expected = [int(best.step(step).belief.states.argmax()) for step in steps[:250]]
     found = [int(r.body.probabilities.argmax()) for r in scene.watcher.beliefs]
     assert np.mean(np.array(found) == expected) > 0.6

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs.translation import step_of
 from support.hand import Watcher
 from support.stack import PATIENT_FIXTURE, PATIENT_ROBOT, Stack
@@ -99,7 +99,7 @@ def test_with_recognition_it_is_guided_along_the_way_of_the_hand(
     assert not any(r.body.contacts for r in watcher.robot)
 
     beliefs = [r.body for r in watcher.beliefs]
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     made = [step_of(received.body) for received in watcher.steps[: len(beliefs)]]
     expected = [recognizer.step(step).belief.states for step in made]
     assert [belief.step for belief in beliefs] == list(range(len(beliefs)))

@@ -15,7 +15,7 @@ from hmcs.motion.demonstrations import read_csv
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from support.hand import Scene
 
 PATIENT = ("--deadline-ms", 250)
@@ -40,7 +40,7 @@ def test_steps_that_repeat_or_jump_back_are_refused_and_change_no_belief(
     for service in listeners:
         assert stack.health(service).refused == {"step": 4}, service.service
         assert stack.health(service).healthy
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     assert [r.body.step for r in watcher.beliefs] == list(range(80))
     for received, step in zip(watcher.beliefs, steps, strict=False):
         expected = recognizer.step(step).belief.states
@@ -61,7 +61,7 @@ def test_a_step_that_jumps_ahead_is_believed_once_those_before_it_are_fetched(
     scene.stack.until(lambda: scene.watcher.belief_of(45))
 
     assert [r.body.step for r in scene.watcher.beliefs] == list(range(46))
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     for received, step in zip(scene.watcher.beliefs, steps, strict=False):
         expected = recognizer.step(step).belief.states
         np.testing.assert_allclose(received.body.probabilities, expected, rtol=0, atol=1e-6)

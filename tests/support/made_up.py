@@ -8,7 +8,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.segment_filter.exits import DEFAULT_WEIGHTS
 from hmcs.recognition.segment_filter.filter import FilterSettings
 from hmcs.recognition.segment_filter.gestemes import GestemeParameters, Scoring
-from hmcs.recognition.segment_filter.recognizer import Layers
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
 from hmcs.recognition.segment_filter.senses import Senses
 from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
@@ -24,7 +24,7 @@ def line_model(name: str, task: Task, points: np.ndarray) -> Model:
         hash="",
         task=task,
         recognizer="segment-filter",
-        knowledge=Layers(
+        knowledge=SegmentFilterModel(
             GestemeParameters(
                 means=np.zeros((1, 2, 6)),
                 variances=np.ones((1, 2, 6)),

@@ -12,7 +12,7 @@ from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.segment_filter.recognizer import bank_of, layers_of
+from hmcs.recognition.segment_filter.recognizer import bank_of, segment_filter_model
 from hmcs.translation import evidence_message, step_of
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
 from hmcs_gesteme_classifier.shares import share_of
@@ -41,7 +41,7 @@ class GestemeClassifier(Service):
         self._living = {bus.source.instance}
         """Peers whose tokens the watch has told of, and not yet that they went."""
         # One more than is scored: how the hand turns in a step follows from the step before it.
-        memory_steps = layers_of(self._model).scoring.window_steps + 1
+        memory_steps = segment_filter_model(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
         self._recent: deque[FedStep] = deque(maxlen=memory_steps)
         self._ready = False

@@ -7,7 +7,7 @@ import numpy as np
 from hmcs.bus.messages import Evidence
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import StepEvidence
-from hmcs.recognition.segment_filter.recognizer import layers_of
+from hmcs.recognition.segment_filter.recognizer import segment_filter_model
 
 
 class UnusableEvidenceError(ValueError):
@@ -42,7 +42,7 @@ def read_evidence(message: Evidence, model: Model) -> StepEvidence:
     held, starts = message.pair_gesteme, message.pair_start
     if len(held) and not (held.min() >= 0 and held.max() < len(gestemes)):
         raise UnusableEvidenceError("a pair names a gesteme the classifier does not hold")
-    oldest = message.step - layers_of(model).scoring.window_steps
+    oldest = message.step - segment_filter_model(model).scoring.window_steps
     if len(starts) and not (starts.min() > oldest and starts.max() <= message.step):
         raise UnusableEvidenceError(
             f"a pair starts outside steps {max(oldest + 1, 0)} to {message.step}"

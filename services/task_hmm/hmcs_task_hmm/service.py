@@ -13,7 +13,11 @@ from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, TaskRecognizer, layers_of
+from hmcs.recognition.segment_filter.recognizer import (
+    SegmentFilterRecognizer,
+    TaskFilter,
+    segment_filter_model,
+)
 from hmcs.translation import belief_message, step_of
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
@@ -31,8 +35,8 @@ class TaskHmm(Service):
     def __init__(self, settings: TaskHmmSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._model = load_model(settings.model, verify=signed_by(settings.model_key))
-        self._recognizer = TaskRecognizer(self._model)
-        self._warming: LayeredRecognizer | None = None
+        self._recognizer = TaskFilter(self._model)
+        self._warming: SegmentFilterRecognizer | None = None
         self._gathering = Gathering(
             self._recognizer.gestemes, round(settings.deadline_ms * _NS_PER_MS)
         )
@@ -47,12 +51,12 @@ class TaskHmm(Service):
             log,
             self._on_step,
             self._on_restart,
-            memory_steps=layers_of(self._model).scoring.window_steps + 1,
+            memory_steps=segment_filter_model(self._model).scoring.window_steps + 1,
         )
 
     def start(self) -> None:
         """Catch up with the motion so far; beliefs begin with the next step."""
-        self._warming = LayeredRecognizer(self._model)
+        self._warming = SegmentFilterRecognizer(self._model)
         self._feed.begin()
         self._recognizer, self._warming = self._warming.task, None
         self.bus.subscribe(Evidence, self.bus.keys.evidence(self._model.name), self._on_evidence)
@@ -72,9 +76,9 @@ class TaskHmm(Service):
         # A motion that is joined in its middle may be in any state of the task.
         anywhere = index > 0
         if self._warming is not None:
-            self._warming = LayeredRecognizer(self._model, anywhere=anywhere)
+            self._warming = SegmentFilterRecognizer(self._model, anywhere=anywhere)
         else:
-            self._recognizer = TaskRecognizer(self._model, anywhere=anywhere)
+            self._recognizer = TaskFilter(self._model, anywhere=anywhere)
         self._gathering.restart(index)
         self._origins.clear()
         self.log.info("beginning anew", extra={"step": index})

@@ -7,10 +7,10 @@ import pytest
 
 from hmcs.bus.messages import Evidence
 from hmcs.recognition.segment_filter.gestemes import Scoring
-from hmcs.recognition.segment_filter.recognizer import Layers
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
 
-LAYERS = Layers(None, Scoring(0.0, 1.0, window_steps=10, prune_nats=30.0), None, None)
+LAYERS = SegmentFilterModel(None, Scoring(0.0, 1.0, window_steps=10, prune_nats=30.0), None, None)
 MODEL = SimpleNamespace(hash="abc", gesteme_names=("a", "b", "c"), knowledge=LAYERS)
 
 

@@ -9,10 +9,10 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Guarded, Recognition, Recognizer, StepEvidence
 from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segment_filter.recognizer import (
-    LayeredRecognizer,
-    Layers,
     Precision,
-    TaskRecognizer,
+    SegmentFilterModel,
+    SegmentFilterRecognizer,
+    TaskFilter,
 )
 
 
@@ -21,8 +21,8 @@ class AsLive:
 
     def __init__(self, model: Model, anywhere: bool, precision: Precision) -> None:
         self._task: _LackingTask | None = None
-        if isinstance(model.knowledge, Layers):
-            layered = LayeredRecognizer(model, anywhere=anywhere, precision=precision)
+        if isinstance(model.knowledge, SegmentFilterModel):
+            layered = SegmentFilterRecognizer(model, anywhere=anywhere, precision=precision)
             layered.task = self._task = _LackingTask(model, anywhere=anywhere)
             self._recognizer: Recognizer = Guarded(layered)
         else:
@@ -35,7 +35,7 @@ class AsLive:
         return self._recognizer.step(step)
 
 
-class _LackingTask(TaskRecognizer):
+class _LackingTask(TaskFilter):
     """The task level, which evidence of some gestemes does not reach."""
 
     missing: frozenset[int] = frozenset()

@@ -8,7 +8,7 @@ from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings, fit_gestemes
 from hmcs.recognition.segment_filter.gestemes import GestemeBank, Scoring
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs.recognition.segment_filter.variants import VariantSettings
 from hmcs.recognition.segments import LearningError, Segment, segments_of
 from hmcs.recognition.serialization import to_arrays
@@ -21,7 +21,7 @@ STATE = {"along": 0, "round": 1, "up": 2}
 def recognized(model, motion):
     """Most probable state and true state of each step."""
     states = list(model.state_names)
-    recognizer = LayeredRecognizer(model)
+    recognizer = SegmentFilterRecognizer(model)
     steps = steps_of(motion.positions, model.task.dead_zone_m)
     beliefs = [recognizer.step(step) for step in steps]
     middles = [step.position + step.displacement / 2 for step in steps]
@@ -52,7 +52,7 @@ def test_motion_that_is_no_part_of_the_task_raises_the_alarm_and_the_task_does_n
     assert np.mean([b.unknown_alarm for b in known]) < 0.1
     angle = np.linspace(0, 6 * np.pi, 600)[:, None]
     spiral = 0.02 * np.hstack([np.cos(angle), 0 * angle, np.sin(2 * angle)]) * (1 + angle / 10)
-    recognizer = LayeredRecognizer(model, anywhere=True)
+    recognizer = SegmentFilterRecognizer(model, anywhere=True)
     strange = [recognizer.step(s) for s in steps_of(spiral, model.task.dead_zone_m)]
     assert np.mean([b.unknown_alarm for b in strange[19:]]) > 0.8
 

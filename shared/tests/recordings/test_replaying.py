@@ -15,7 +15,7 @@ from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import save_model
 from hmcs.recognition.recognizer import Recognition, StepEvidence
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, TaskRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer, TaskFilter
 from hmcs.recordings.comparing import compared
 from hmcs.recordings.guiding import guided
 from hmcs.recordings.parts import Preface, Recording
@@ -123,12 +123,12 @@ def lacking(
     said: list[Logged], model: Model, lost: Callable[[int], frozenset[int]]
 ) -> list[Logged]:
     """The same cell, whose task HMM did not get some evidence in time."""
-    layered = LayeredRecognizer(model, precision="float32")
+    layered = SegmentFilterRecognizer(model, precision="float32")
     task = layered.task
     made: list[Logged] = []
     step = None
 
-    class Deaf(TaskRecognizer):
+    class Deaf(TaskFilter):
         def step(self, evidence: StepEvidence) -> Recognition:
             missing = lost(evidence.step)
             kept = [k for k, g in enumerate(evidence.pair_gesteme) if g not in missing]

@@ -12,7 +12,7 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs.task import load_task
 from hmcs_local.demo.measure import Measured, measure
 from hmcs_local.demo.recording import (
@@ -91,7 +91,7 @@ def recorded(model: Model, performance: Demonstration) -> Callable[..., Recordin
             int(np.linalg.norm(positions - (s.position + s.displacement), axis=1).argmin())
             for s in steps
         ]
-        recognizer = LayeredRecognizer(model)
+        recognizer = SegmentFilterRecognizer(model)
         recognized = [recognizer.step(step).belief for step in steps]
         step_rows: list[tuple[Any, ...]] = [
             (sample[end], captured[end], captured[end] + MS, s.index, s.position, s.displacement)

@@ -15,7 +15,7 @@ from hmcs.arrays import Array
 from hmcs.motion.steps import steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.registry import recognizer_of
-from hmcs.recognition.segment_filter.recognizer import layers_of
+from hmcs.recognition.segment_filter.recognizer import segment_filter_model
 from hmcs_laboratory.calibration import BINS, Reliability, reliability
 from hmcs_laboratory.data.drawn_tasks import fixed_order
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
@@ -134,7 +134,7 @@ def unknown_intent(settings: UnknownFigureSettings, rng: np.random.Generator) ->
         np.array([each.mean_log_likelihood for each in told]),
         np.array([each.unknown_alarm for each in told]),
     )
-    alarm = layers_of(model).alarm
+    alarm = segment_filter_model(model).alarm
     picture = new_picture(6.4)
     # Typed as one subfigure, whatever is asked for.
     halves: Any = picture.subfigures(1, 2, width_ratios=(2, 3))

@@ -15,7 +15,7 @@ from hmcs.motion.steps import Step, steps_of
 from hmcs.recognition.learning import learn
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.registry import recognizer_of
-from hmcs.recognition.segment_filter.recognizer import layers_of
+from hmcs.recognition.segment_filter.recognizer import segment_filter_model
 from hmcs_laboratory.data.drawn_tasks import fixed_order
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
@@ -199,7 +199,7 @@ def _segment_filter(data: TaskSet, rng: np.random.Generator) -> _Method:
     model = learn(data.task, data.demonstrations, rng=rng)
     return _Method(
         lambda: recognizer_of(model),
-        layers_of(model).alarm.window_steps,
+        segment_filter_model(model).alarm.window_steps,
         lambda told: np.array([each.mean_log_likelihood for each in told]),
         alarms=True,
     )

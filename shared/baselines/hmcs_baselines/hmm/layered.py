@@ -30,7 +30,7 @@ Passes = Literal["winner", "distribution"]
 
 
 class LayerError(UserError, ValueError):
-    """Layers that do not fit together, or no such layer; says which and why."""
+    """Layers of a model that do not fit together, or no such layer; says which and why."""
 
 
 @dataclass(frozen=True, eq=False)

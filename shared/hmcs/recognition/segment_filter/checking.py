@@ -22,7 +22,7 @@ from hmcs.recognition.segment_filter.gestemes import (
     GestemeParameters,
     Scoring,
 )
-from hmcs.recognition.segment_filter.recognizer import Layers
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
 from hmcs.recognition.segment_filter.senses import Senses
 from hmcs.recognition.sensors import Sensors, dimensions
 from hmcs.recognition.unknown import AlarmSettings
@@ -32,7 +32,7 @@ LONGEST_ALARM_STEPS = 10_000
 """The alarm remembers so many steps at most."""
 
 
-def check_layers(layers: Layers, task: Task) -> None:
+def check_segment_filter(layers: SegmentFilterModel, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task, or a number is none
     that the filter can compute with."""
     _check_parameters(layers.parameters, task)

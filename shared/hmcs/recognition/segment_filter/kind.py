@@ -5,18 +5,18 @@ from __future__ import annotations
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
-from hmcs.recognition.segment_filter.checking import check_layers
+from hmcs.recognition.segment_filter.checking import check_segment_filter
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
-from hmcs.recognition.segment_filter.learning import learn_layers
-from hmcs.recognition.segment_filter.recognizer import LayeredRecognizer, Layers
+from hmcs.recognition.segment_filter.learning import learn_segment_filter
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel, SegmentFilterRecognizer
 
 
-def _learn(data: TrainingData) -> Layers:
-    return learn_layers(data.task, data.segments, data.settings, data.progress)
+def _learn(data: TrainingData) -> SegmentFilterModel:
+    return learn_segment_filter(data.task, data.segments, data.settings, data.progress)
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
-    return LayeredRecognizer(model, anywhere=anywhere)
+    return SegmentFilterRecognizer(model, anywhere=anywhere)
 
 
 KIND = RecognizerSpec(
@@ -24,8 +24,8 @@ KIND = RecognizerSpec(
     summary="exact filter over (task state, segment start, gesteme phase) with an unknown state",
     source="HMCS; solves the restart problem of Aarno 2007, chapters 4 and 5",
     settings=LearningSettings,
-    knowledge=Layers,
+    knowledge=SegmentFilterModel,
     learn=_learn,
     recognizer=_recognizer,
-    check=check_layers,
+    check=check_segment_filter,
 )

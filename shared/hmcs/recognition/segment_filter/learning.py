@@ -23,19 +23,19 @@ from hmcs.recognition.segment_filter.gestemes import (
     GestemeParameters,
     Scoring,
 )
-from hmcs.recognition.segment_filter.recognizer import Layers
+from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
 from hmcs.recognition.segments import LearningError, Segment
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import fit_of, learn_alarm
 from hmcs.task import Task
 
 
-def learn_layers(
+def learn_segment_filter(
     task: Task,
     segments: Sequence[Segment],
     settings: LearningSettings,
     progress: Callable[[str], None] = lambda _: None,
-) -> Layers:
+) -> SegmentFilterModel:
     """Return what the segment filter learns from segments that cover all gestemes of the task."""
     by_gesteme = [[s for s in segments if s.gesteme == g] for g in range(len(task.gestemes))]
     axes = axes_of(task)
@@ -62,7 +62,7 @@ def learn_layers(
         rise = scoring.temperature * settings.unknown_rise * max(level, 0.0)
         scoring = scoring._replace(background=scoring.background + rise)
     alarm = learn_alarm(_fits(held_out, scoring, axes, task, settings), width)
-    return Layers(parameters, scoring, settings.filter, alarm)
+    return SegmentFilterModel(parameters, scoring, settings.filter, alarm)
 
 
 def _window(

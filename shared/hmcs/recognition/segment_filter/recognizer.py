@@ -25,7 +25,7 @@ Precision = Literal["float32", "float64"]
 """Of evidence on its way from layer to layer."""
 
 
-class Layers(NamedTuple):
+class SegmentFilterModel(NamedTuple):
     """What the layered segment filter knows."""
 
     parameters: GestemeParameters
@@ -35,12 +35,12 @@ class Layers(NamedTuple):
     alarm: AlarmSettings
 
 
-def layers_of(model: Model) -> Layers:
+def segment_filter_model(model: Model) -> SegmentFilterModel:
     """Return what the layered segment filter knows.
 
     Raises UserError where the model was learned for another recognizer.
     """
-    if not isinstance(model.knowledge, Layers):
+    if not isinstance(model.knowledge, SegmentFilterModel):
         raise UserError(
             f"model {model.name!r} is for the recognizer {model.recognizer!r}, which is one "
             "process: start hmcs_recognizer with it instead of classifiers and a task HMM"
@@ -50,23 +50,25 @@ def layers_of(model: Model) -> Layers:
 
 def bank_of(model: Model, held: Sequence[int] | None = None) -> GestemeBank:
     """Return a fresh bank of the gestemes with the indices `held`, or of all."""
-    layers = layers_of(model)
+    layers = segment_filter_model(model)
     indices = range(len(model.task.gestemes)) if held is None else held
     return GestemeBank(layers.parameters, layers.scoring, model.axes, indices)
 
 
 def filter_of(model: Model, *, anywhere: bool = False) -> SegmentFilter:
     """Return a fresh filter for the task; with `anywhere` every state may be the first."""
-    return SegmentFilter(chain_of(model.task, anywhere=anywhere), layers_of(model).filter_settings)
+    return SegmentFilter(
+        chain_of(model.task, anywhere=anywhere), segment_filter_model(model).filter_settings
+    )
 
 
-class TaskRecognizer:
+class TaskFilter:
     """The task level of the layered HMM: evidence in, recognition out."""
 
     def __init__(self, model: Model, *, anywhere: bool = False) -> None:
         """Begin with the task's first state or, with `anywhere`, in any of its states."""
         self._filter = filter_of(model, anywhere=anywhere)
-        self._alarm = UnknownAlarm(layers_of(model).alarm)
+        self._alarm = UnknownAlarm(segment_filter_model(model).alarm)
 
     @property
     def gestemes(self) -> tuple[int, ...]:
@@ -79,16 +81,16 @@ class TaskRecognizer:
         return Recognition(belief, *self._alarm.step(belief.log_likelihood, belief.unknown))
 
 
-class LayeredRecognizer:
+class SegmentFilterRecognizer:
     """The whole layered HMM in one object: gesteme models in parallel, the task above them."""
 
     def __init__(
         self, model: Model, *, anywhere: bool = False, precision: Precision = "float64"
     ) -> None:
-        """Begin as `TaskRecognizer` does; evidence is rounded to `precision` between the layers."""
+        """Begin as `TaskFilter` does; evidence is rounded to `precision` between the layers."""
         self._bank = bank_of(model)
         self._precision = precision
-        self.task = TaskRecognizer(model, anywhere=anywhere)
+        self.task = TaskFilter(model, anywhere=anywhere)
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
