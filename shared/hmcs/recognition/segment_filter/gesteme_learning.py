@@ -97,7 +97,7 @@ def fit_gestemes(
 ) -> GestemeParameters:
     """Return the HMMs of all gestemes from their segments; see the module's docstring.
 
-    The exit is the default one: it is learned from segments left out, see `layers_learning`.
+    The exit is the default one: it is learned from segments left out, see `learning`.
     """
     motions = [[segment.motion(axes) for segment in own] for own in by_gesteme]
     split = split_into_variants([[m.positions for m in own] for own in motions], settings.variants)
