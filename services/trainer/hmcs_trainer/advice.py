@@ -24,7 +24,7 @@ def advice(model: Model, judgment: Judgment) -> list[str]:
             "No demonstration can be left out, so nobody knows how well this model recognizes: "
             "show the whole task at least twice.",
         )
-    return told or ["Nothing stands out: the states are distinguished, soon, and shown alike."]
+    return told or ["Nothing stands out: the states are told apart, soon, and shown alike."]
 
 
 def _confused(model: Model, judgment: Judgment) -> list[str]:
