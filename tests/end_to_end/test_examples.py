@@ -16,7 +16,7 @@ from hmcs.bus.verbs import LAST_STEPS
 from hmcs.motion.steps import Step
 from hmcs.recognition.model_file import load_model
 from support.hand import Scene, Watcher
-from support.stack import CELL, DEADLINE_S, PATIENT_FIXTURE, Stack, clean_environment
+from support.stack import CELL, PATIENT_FIXTURE, Stack, clean_environment, run_python
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -26,15 +26,7 @@ SCREEN_LINES = 80
 
 def run(name: str, *words: object, folder: Path) -> list[str]:
     """Run an example to its end in a folder of its own; return the lines it printed."""
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / name), *map(str, words)],
-        cwd=folder,
-        env=clean_environment(),
-        capture_output=True,
-        text=True,
-        timeout=DEADLINE_S,
-        check=False,
-    )
+    done = run_python([str(EXAMPLES / name), *map(str, words)], folder)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 

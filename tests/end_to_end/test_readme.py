@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs_local.processes import StackProcess
 from support.hand import Scene
-from support.stack import DEADLINE_S, Stack, clean_environment
+from support.stack import Stack, run_python
 
 ROOT = Path(__file__).parents[2]
 OWN_RECOGNIZER = ROOT / "docs/how-to/own-recognizer.md"
@@ -29,15 +27,7 @@ def program_in(document: Path) -> str:
 
 
 def test_the_program_in_the_readme_tells_the_states_one_after_the_other() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", program_in(ROOT / "README.md")],
-        cwd=ROOT,
-        env=clean_environment(),
-        capture_output=True,
-        text=True,
-        timeout=DEADLINE_S,
-        check=False,
-    )
+    done = run_python(["-c", program_in(ROOT / "README.md")], ROOT)
     assert done.returncode == 0, done.stderr
     assert list(dict.fromkeys(done.stdout.split())) == ["reach", "turn", "lift"]
 

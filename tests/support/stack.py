@@ -235,12 +235,13 @@ def log_events(process: StackProcess) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines if line.startswith("{")]
 
 
-def run_to_end(
-    command: Sequence[str], within_s: float = DEADLINE_S
+def run_python(
+    words: Sequence[str], folder: Path | None = None, within_s: float = DEADLINE_S
 ) -> subprocess.CompletedProcess[str]:
-    """Run `python -m …` to its end."""
+    """Run `python …` to its end, in a folder where one is given."""
     return subprocess.run(
-        [sys.executable, "-m", *command],
+        [sys.executable, *words],
+        cwd=folder,
         env=clean_environment(),
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -248,3 +249,10 @@ def run_to_end(
         timeout=within_s,
         check=False,
     )
+
+
+def run_to_end(
+    command: Sequence[str], within_s: float = DEADLINE_S
+) -> subprocess.CompletedProcess[str]:
+    """Run `python -m …` to its end."""
+    return run_python(["-m", *command], within_s=within_s)
