@@ -100,24 +100,22 @@ def test_a_program_without_hmcs_hears_beliefs(
 ) -> None:
     stack = scene.stack
     stack.bring_up("recognizer", "r", "--model", model_file)
-    listener = subprocess.Popen(
-        [sys.executable, str(EXAMPLES / "06_listen_without_hmcs.py"), stack.endpoint, CELL],
-        env=clean_environment(),
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        scene.hand.play(steps, 20.0)
-        assert listener.stdout is not None
-        with ThreadPoolExecutor(1) as aside:
+    with (
+        subprocess.Popen(
+            [sys.executable, str(EXAMPLES / "06_listen_without_hmcs.py"), stack.endpoint, CELL],
+            env=clean_environment(),
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as listener,
+        ThreadPoolExecutor(1) as aside,
+    ):
+        try:
+            assert listener.stdout is not None
             line = aside.submit(listener.stdout.readline)
-            try:
-                stack.until(line.done)
-            finally:
-                listener.kill()
-    finally:
-        listener.kill()
-        listener.wait()
+            scene.hand.play(steps, 20.0)
+            stack.until(line.done)
+        finally:
+            listener.kill()
     _, step, state, probability = line.result().split()
     assert step.removesuffix(":").isdigit()
     assert state in load_model(model_file).state_names

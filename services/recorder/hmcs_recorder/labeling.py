@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from hmcs.bus.messages import Done, Outline, OutlineQuestion, SetLabels
 from hmcs.bus.session import RequestRefusedError
+from hmcs.errors import first_problem
 from hmcs.recordings.outlining import outlined, recording_named, recordings_in, set_labels
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs_recorder.settings import RecorderSettings
@@ -36,10 +37,9 @@ def outline_of(settings: RecorderSettings, asked: OutlineQuestion) -> Outline:
             states=outline.states,
         )
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        where, why = first_problem(error)
         raise RequestRefusedError(
-            f"{path.name} cannot be shown, its {where} is no hand's: {first['msg']}; record it "
+            f"{path.name} cannot be shown, its {where} is no hand's: {why}; record it "
             f"again, or look at it by `hmcs inspect {path}`"
         ) from None
 

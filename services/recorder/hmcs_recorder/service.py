@@ -1,6 +1,6 @@
 """The service: everything that is published in the cell, into a file, and never in anybody's way.
 
-Where the disk is full, or the folder gone, the recording ends, which health reports and log;
+Where the disk is full, or the folder gone, the recording ends, which health and log report;
 what comes from then on is counted as lost, and recording goes on in a new file as soon as it can.
 Recordings are read, to set labels by, on a thread of its own meanwhile.
 """

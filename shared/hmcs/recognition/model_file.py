@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hmcs.bounded_files import UnreadableFileError, read_bounded
-from hmcs.errors import UserError
+from hmcs.errors import UserError, first_problem
 from hmcs.recognition.checking import LARGEST, check_shapes, check_within
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_archive import ARRAYS, MANIFEST, MOST_BYTES, Archive, ArchiveError
@@ -146,11 +146,8 @@ def _manifest(source: Path, fields: Any) -> Manifest:
     try:
         return Manifest.model_validate(fields)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise ModelFileError(
-            f"{source}: not a complete model: {where}: {first['msg']:.300}"
-        ) from error
+        where, why = first_problem(error)
+        raise ModelFileError(f"{source}: not a complete model: {where}: {why:.300}") from error
 
 
 def _model(source: Path, fields: dict[str, Any], manifest: Manifest, archive: Archive) -> Model:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from hmcs.errors import UserError
+from hmcs.errors import UserError, first_problem
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Guarded, Recognizer
@@ -97,9 +97,8 @@ def settings_of(kind: RecognizerSpec, given: Mapping[str, str]) -> Any:
             f"recognizer {kind.name!r} has no setting {error.args[0]!r}: it has {names}"
         ) from None
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise UserError(f"recognizer {kind.name!r}, setting {where}: {first['msg']}") from None
+        where, why = first_problem(error)
+        raise UserError(f"recognizer {kind.name!r}, setting {where}: {why}") from None
 
 
 def setting_values(settings: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from hmcs.errors import first_problem
+
 AnyArray = NDArray[Any]
 Knowledge = TypeVar("Knowledge")
 
@@ -77,9 +79,8 @@ def from_arrays(kind: type[Knowledge], content: Content) -> Knowledge:
     try:
         return adapter.validate_python(_restored(content.plain, content.arrays))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise ContentError(f"{where}: {first['msg']}") from error
+        where, why = first_problem(error)
+        raise ContentError(f"{where}: {why}") from error
 
 
 def _plain(value: object, name: str, arrays: dict[str, AnyArray]) -> Any:

@@ -43,7 +43,7 @@ WHOLE = (
 """Methods that classify a whole gesteme."""
 
 RECOGNIZERS = (
-    recognizer("segment-filter", "hmcs.recognition.segment_filter.filter"),
+    recognizer("segment-filter", "hmcs.recognition.segment_filter"),
     recognizer(
         "segment-filter",
         "the same, each gesteme aligned in size and turn while it is performed",

@@ -30,7 +30,7 @@ Passes = Literal["winner", "distribution"]
 
 
 class LayerError(UserError, ValueError):
-    """Layers of a model that do not fit together, or no such layer; says which and why."""
+    """Layers that do not fit together, or no such layer; says which and why."""
 
 
 @dataclass(frozen=True, eq=False)
