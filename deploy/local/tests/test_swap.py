@@ -80,13 +80,15 @@ def test_the_old_one_goes_on_when_the_newcomer_is_not_ready(
 
 
 def test_only_a_classifier_at_work_that_up_has_started_is_replaced(
-    stack: LocalStack, bus: Bus, served: Served
+    stack: LocalStack, bus: Bus, served: Served, eventually: Eventually
 ) -> None:
     control = Control(stack.folder)
     with pytest.raises(SwapError, match=f"no classifier 'robot-1' .* choose from {OLD}"):
         served(stack, lambda: replace_classifier(bus, control, "robot-1"))
     with Bus.open(BusSettings(router=stack.router, cell=CELL), "stranger", "s") as other:
-        other.announce(other.keys.member("fake", "gesteme_classifier", "elsewhere"))
+        member = other.keys.member("fake", "gesteme_classifier", "elsewhere")
+        other.announce(member)
+        eventually(lambda: bus.alive(member))
         with pytest.raises(SwapError, match="elsewhere was not started by"):
             served(stack, lambda: replace_classifier(bus, control, "elsewhere"))
 

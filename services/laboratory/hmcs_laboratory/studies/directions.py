@@ -283,7 +283,7 @@ _FOLLOWING: Mapping[Following, Callable[[TaskSet, np.random.Generator], tuple[Ar
 
 DIRECTIONS = Study(
     "directions",
-    "how many directions a task of lines has, and how soon a change of direction is noticed",
+    "how many directions a task of lines has, how soon a change of them is noticed",
     "Aarno 2007, chapter 3",
     DirectionsSettings,
     directions_trial,
