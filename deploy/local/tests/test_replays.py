@@ -20,7 +20,7 @@ from hmcs.recognition.model_file import load_model, save_model
 from hmcs.recordings.parts import Preface, Recording
 from hmcs.recordings.plain import BY_SCHEMA, fields_of
 from hmcs.task import Task
-from hmcs_local.command import replay as replay_command
+from hmcs_local.commands.recordings import replay as replay_command
 from hmcs_local.replays import OPEN_LOOP
 from support.cells import KEYS, Logged, performance, write_cell
 from support.lessons import ROUND, lesson_task

@@ -1,0 +1,138 @@
+"""Run the stack of compose.yaml or a router, see how it is: `up`, `status`, `router`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from hmcs.bus.config import DEFAULT_ROUTER
+from hmcs.errors import UserError
+from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure
+from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+
+
+def up(
+    services: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,…",
+            help="Start these services only. Without `router` among them, the one at --router "
+            "is joined.",
+        ),
+    ] = "",
+    scale: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SERVICE=N", help="So many instances of a service; may be repeated."),
+    ] = None,
+    router: Annotated[
+        str,
+        typer.Option(
+            metavar="ENDPOINT", help="Where the embedded router listens; port 0: any free one."
+        ),
+    ] = DEFAULT_ROUTER,
+    compose: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The stack; compose.yaml by default.")
+    ] = None,
+    folder: Folder = DEFAULT_FOLDER,
+    open_to_network: Open = False,
+    secure: Secure = None,
+    signed_models: Annotated[
+        bool,
+        typer.Option(
+            "--signed-models",
+            help="With --secure: no process loads a model that is not signed for the cell, see "
+            "`hmcs secure sign`.",
+        ),
+    ] = False,
+) -> None:
+    """Run the stack of compose.yaml as processes here, with the router embedded.
+
+    With --secure every process comes with its certificate, and the router refuses everybody else.
+    Ctrl-C ends them all. `${NAME}` in compose.yaml is taken from the environment.
+    """
+    from hmcs_local.launcher import run_up
+    from hmcs_secure.closed_cell import find_closed_cell
+    from hmcs_secure.router_file import DEFAULT_LISTEN
+
+    if signed_models and not secure:
+        raise UserError("--signed-models: name the closed cell whose key counts, by --secure")
+    closed = find_closed_cell(secure, signed_models=signed_models) if secure else None
+    if closed is not None and router == DEFAULT_ROUTER:
+        router = DEFAULT_LISTEN
+    chosen = tuple(name.strip() for name in services.split(",") if name.strip())
+    console = Console(highlight=False, soft_wrap=True)
+    code = run_up(
+        lambda while_waiting: LocalStack(
+            compose,
+            services=chosen or None,
+            scale=dict(_scale(item) for item in scale or []),
+            router=router,
+            folder=folder,
+            open_to_network=open_to_network,
+            closed=closed,
+            while_waiting=while_waiting,
+        ),
+        lambda who, what: console.print(_line(who, what)),
+    )
+    raise typer.Exit(code)
+
+
+def status(
+    once: Annotated[bool, typer.Option("--once", help="Show it once and end.")] = False,
+    router: Router = DEFAULT_ROUTER,
+    cell: Cell = "demo",
+    secure: Secure = None,
+) -> None:
+    """Show who is there, how each is, rates, losses and the active model, and whether it is run.
+
+    With --once, the exit code is 0 when somebody is there, everybody is healthy and somebody runs
+    the model that is followed, else 1.
+    """
+    from hmcs_local.connecting import open_observer
+    from hmcs_local.status import show_status
+
+    with open_observer(router, cell, secure) as bus:
+        well = show_status(bus, Console(), once=once)
+    raise typer.Exit(0 if well else 1)
+
+
+def router(
+    listen: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help=f"Where it listens; what --config names by default, or {DEFAULT_ROUTER}.",
+        ),
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A Zenoh json5 file, for TLS, access, …")
+    ] = None,
+    open_to_network: Open = False,
+) -> None:
+    """Run a router alone, until Ctrl-C. It is reached from this machine only, unless told to."""
+    from hmcs.bus.router import main as run_router
+
+    words = ["--listen", listen] if listen else []
+    words += ["--config", str(config)] if config else []
+    words += ["--open-to-network"] if open_to_network else []
+    raise typer.Exit(run_router(words))
+
+
+def _scale(item: str) -> tuple[str, int]:
+    name, _, count = item.partition("=")
+    if not count.isdecimal():
+        raise UserError(f"--scale {item}: write SERVICE=N, e.g. gesteme-classifier=3")
+    return name, int(count)
+
+
+_STYLES = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green")
+
+
+def _line(who: str, what: str) -> Text:
+    style = "bold" if who == "hmcs" else _STYLES[sum(who.encode()) % len(_STYLES)]
+    head = f"{who:22} | "
+    return Text.assemble((head, style), what.replace("\n", f"\n{'':22} | "))
