@@ -15,7 +15,8 @@ from hypothesis.extra import numpy as npst
 from pydantic import AfterValidator, BaseModel
 
 from hmcs.bus.arrays import LARGEST, ArraySpec
-from hmcs.bus.messages import Envelope, Message, Within
+from hmcs.bus.messages import Envelope, Message
+from hmcs.bus.messages.fields import Within
 
 Any_ = st.SearchStrategy[Any]
 

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import BaseModel
 
 from hmcs.bus.examples import EXAMPLES
-from hmcs.bus.messages import MESSAGES, Message, Part
+from hmcs.bus.messages import MESSAGES, Message
+from hmcs.bus.messages.message import Part
 
 Path = tuple[str | int, ...]
 """Of a text in a message: names of fields, 0 for the first of many, `a key` and `a value`."""
