@@ -10,7 +10,7 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 
 # Their processes have deadlines to meet: one stack at a time, nothing of ours beside it, and before
 # the rest of the machine. Without the right to that, nice warns and runs them all the same.
-WHOLE_STACKS := deploy/local/tests/demo $(addprefix tests/,bench end_to_end faults fuzz hosts)
+WHOLE_STACKS := deploy/demo/tests $(addprefix tests/,bench end_to_end faults fuzz hosts)
 BEFORE_OTHERS := nice -n -10
 
 export OMP_NUM_THREADS ?= 1

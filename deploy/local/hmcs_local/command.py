@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import io
 import sys
-from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from hmcs.errors import UserError
 from hmcs.shown import plain
+from hmcs_local.added_commands import add_commands
 from hmcs_local.commands import (
     laboratory,
     operation,
@@ -60,23 +59,7 @@ _IN_ORDER_OF_HELP = (
 )
 for _command in _IN_ORDER_OF_HELP:
     app.command()(_command)
-
-
-@app.command()
-def demo(
-    output: Annotated[
-        Path, typer.Option(metavar="DIR", help="The folder the report is written to.")
-    ] = Path("out/demo"),
-    seed: Annotated[int, typer.Option(help="Chooses which classifier is killed, and when.")] = 1,
-    held_out: Annotated[
-        str, typer.Option(metavar="N,N", help="The demonstrations played, and not learned from.")
-    ] = "6,7",
-) -> None:
-    """Run the whole stack on held-out human motion, swap a classifier, write a report."""
-    numbers = _numbers(held_out)
-    from hmcs_local.demo import run_demo
-
-    raise typer.Exit(run_demo(output=output, seed=seed, held_out=numbers))
+add_commands(app)
 
 
 def main() -> None:
@@ -91,12 +74,6 @@ def main() -> None:
         lines = (plain(line, _LONGEST_LINE) for line in str(error).split("\n"))
         sys.stderr.write("hmcs: " + "\n".join(lines) + "\n")
         sys.exit(USER_MISTAKE)
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    if not all(part.strip().isdecimal() for part in text.split(",")):
-        raise UserError(f"--held-out {text}: write numbers with commas between them, e.g. 6,7")
-    return tuple(int(part) for part in text.split(","))
 
 
 if __name__ == "__main__":

@@ -166,7 +166,6 @@ def test_up_on_a_taken_port_is_refused(
         (["swap"], "name either a classifier to replace or a model"),
         (["swap", "a", "--activate", "b"], "name either a classifier to replace or a model"),
         (["swap", "--with", "x", "--activate", "b"], "name either a classifier"),
-        (["demo", "--held-out", "1;5"], "--held-out 1;5: write numbers"),
     ],
 )
 def test_a_mistake_is_one_message_and_exit_code_2(

@@ -13,17 +13,17 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import Path
 from hmcs.recognition.model import Model
 from hmcs.recognition.scoring import NONE
-from hmcs_local.demo.measure import Measured, longest_delay_ms, measure, missing_between
-from hmcs_local.demo.recording import (
+from hmcs_demo.measure import Measured, longest_delay_ms, measure, missing_between
+from hmcs_demo.recording import (
     NO_SAMPLE,
     Motions,
     Recording,
     load_recording,
     save_recording,
 )
-from hmcs_local.demo.summary import Summary
-from hmcs_local.demo.tracks import path_errors, recognized
-from hmcs_local.demo.truth import RunError, SampleClock, Segment
+from hmcs_demo.summary import Summary
+from hmcs_demo.tracks import path_errors, recognized
+from hmcs_demo.truth import RunError, SampleClock, Segment
 
 Record = Callable[..., Recording]
 MS = 1_000_000

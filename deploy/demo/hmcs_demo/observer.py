@@ -16,8 +16,8 @@ from hmcs.bus.keys import ANY
 from hmcs.bus.messages import Belief, Command, FixtureState, Motion, Origin, RobotState, Step
 from hmcs.bus.service import Service, ServiceSettings, run
 from hmcs.bus.session import Bus, Received
-from hmcs_local.demo.progress import PROGRESS, Progress
-from hmcs_local.demo.recording import (
+from hmcs_demo.progress import PROGRESS, Progress
+from hmcs_demo.recording import (
     NO_SAMPLE,
     Beliefs,
     Commands,

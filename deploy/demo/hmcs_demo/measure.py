@@ -15,9 +15,9 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.paths import Path
 from hmcs.recognition.model import Model
 from hmcs.recognition.scoring import NONE, Scores, midway_labels, score
-from hmcs_local.demo.recording import NO_SAMPLE, Beliefs, Recording
-from hmcs_local.demo.tracks import Track, track
-from hmcs_local.demo.truth import RunError, SampleClock, Segment
+from hmcs_demo.recording import NO_SAMPLE, Beliefs, Recording
+from hmcs_demo.tracks import Track, track
+from hmcs_demo.truth import RunError, SampleClock, Segment
 
 IntArray = NDArray[np.int64]
 

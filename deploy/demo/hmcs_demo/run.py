@@ -19,13 +19,13 @@ from hmcs.motion.demonstrations import read_csv
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.task import Task, load_task
-from hmcs_local.demo.measure import measure
-from hmcs_local.demo.play import RATE_HZ, Plan, Played, play
-from hmcs_local.demo.progress import ProgressLine
-from hmcs_local.demo.recording import Recording, load_recording
-from hmcs_local.demo.report import write_report
-from hmcs_local.demo.summary import RunFacts, summarize
-from hmcs_local.demo.truth import RunError
+from hmcs_demo.measure import measure
+from hmcs_demo.play import RATE_HZ, Plan, Played, play
+from hmcs_demo.progress import ProgressLine
+from hmcs_demo.recording import Recording, load_recording
+from hmcs_demo.report import write_report
+from hmcs_demo.summary import RunFacts, summarize
+from hmcs_demo.truth import RunError
 from hmcs_local.interrupts import interruptible
 
 TASK = "human-shapes"

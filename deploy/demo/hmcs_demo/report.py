@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from hmcs.shown import as_html
 from hmcs.task import Task
-from hmcs_local.demo import figures
-from hmcs_local.demo.measure import Measured
-from hmcs_local.demo.page import PAGE
-from hmcs_local.demo.summary import RmsMax, Summary, described
+from hmcs_demo import figures
+from hmcs_demo.measure import Measured
+from hmcs_demo.page import PAGE
+from hmcs_demo.summary import RmsMax, Summary, described
 
 PATHS, BELIEF, LATENCY, PATH_ERROR = (
     "hand_and_robot.png",

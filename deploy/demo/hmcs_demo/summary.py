@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from hmcs_local.demo.measure import Measured, longest_delay_ms, missing_between
+from hmcs_demo.measure import Measured, longest_delay_ms, missing_between
 
 AROUND_SWAP_S = 1.0
 """How near to the swap counts as around it."""

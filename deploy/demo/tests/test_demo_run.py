@@ -12,14 +12,13 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration, write_csv
 from hmcs.recognition.model_file import load_model
 from hmcs.task import load_task
+from hmcs_demo import run as demo
+from hmcs_demo.measure import measure
+from hmcs_demo.play import Plan, play
+from hmcs_demo.progress import Progress, ProgressLine
+from hmcs_demo.recording import load_recording
+from hmcs_demo.truth import RunError
 from hmcs_local.command import main
-from hmcs_local.demo import run as demo
-from hmcs_local.demo import run_demo
-from hmcs_local.demo.measure import measure
-from hmcs_local.demo.play import Plan, play
-from hmcs_local.demo.progress import Progress, ProgressLine
-from hmcs_local.demo.recording import load_recording
-from hmcs_local.demo.truth import RunError
 from hmcs_trainer.performance import perform
 from hmcs_trainer.training import train
 
@@ -31,25 +30,29 @@ def test_numbers_that_cannot_be_held_out_are_told(
     tmp_path: Path, held_out: tuple[int, ...]
 ) -> None:
     with pytest.raises(UserError, match="two different numbers from 1 to 7"):
-        run_demo(output=tmp_path / "report", seed=1, held_out=held_out)
+        demo.run(output=tmp_path / "report", seed=1, held_out=held_out)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("numbers", ["1,9", "1;5"])
 def test_mistake_on_the_command_line_is_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    numbers: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    words = ["hmcs", "demo", "--output", str(tmp_path / "report"), "--held-out", "1,9"]
+    words = ["hmcs", "demo", "--output", str(tmp_path / "report"), "--held-out", numbers]
     monkeypatch.setattr("sys.argv", words)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    assert "--held-out 1,9" in capsys.readouterr().err
+    assert f"--held-out {numbers}: " in capsys.readouterr().err
 
 
 def test_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(UserError, match="cannot be written"):
-        run_demo(output=tmp_path / "file" / "report", seed=1, held_out=(1, 5))
+        demo.run(output=tmp_path / "file" / "report", seed=1, held_out=(1, 5))
 
 
 def replace_run(monkeypatch: pytest.MonkeyPatch, error: BaseException | None) -> None:
@@ -71,7 +74,7 @@ def test_interrupted_run_leaves_the_report_of_the_last_one_and_nothing_else(
     output.mkdir()
     (output / "index.html").write_text("old", encoding="utf-8")
     replace_run(monkeypatch, KeyboardInterrupt())
-    assert run_demo(output=output, seed=1, held_out=(1, 5)) == 130
+    assert demo.run(output=output, seed=1, held_out=(1, 5)) == 130
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
     assert (output / "index.html").read_text(encoding="utf-8") == "old"
 
@@ -84,7 +87,7 @@ def test_report_takes_the_place_of_the_last_one_and_spares_what_is_no_part_of_it
     for name in ("index.html", "my-notes.txt"):
         (output / name).write_text("old", encoding="utf-8")
     replace_run(monkeypatch, None)
-    assert run_demo(output=output, seed=1, held_out=(1, 5)) == 0
+    assert demo.run(output=output, seed=1, held_out=(1, 5)) == 0
     assert (output / "index.html").read_text(encoding="utf-8") == "new"
     assert (output / "my-notes.txt").read_text(encoding="utf-8") == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
@@ -94,7 +97,7 @@ def test_run_that_does_not_come_about_leaves_its_logs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     replace_run(monkeypatch, RunError("robot-1 ended by itself"))
-    assert run_demo(output=tmp_path / "report", seed=1, held_out=(1, 5)) == 1
+    assert demo.run(output=tmp_path / "report", seed=1, held_out=(1, 5)) == 1
     assert "robot-1 ended by itself" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["report-failed"]
     assert (tmp_path / "report-failed" / "robot-1.log").read_text(encoding="utf-8") == "said"

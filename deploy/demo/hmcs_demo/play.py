@@ -14,11 +14,11 @@ from typing import NamedTuple
 from hmcs.bus.messages import Ask, Health
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import HEALTH
+from hmcs_demo.cpu import CpuMeter
+from hmcs_demo.observer import Observer
+from hmcs_demo.progress import PROGRESS, Progress, ProgressLine
+from hmcs_demo.truth import RunError
 from hmcs_local.connecting import open_observer
-from hmcs_local.demo.cpu import CpuMeter
-from hmcs_local.demo.observer import Observer
-from hmcs_local.demo.progress import PROGRESS, Progress, ProgressLine
-from hmcs_local.demo.truth import RunError
 from hmcs_local.observer import Sighting, look
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import LocalStack
@@ -166,7 +166,7 @@ def _observer(stack: LocalStack, recording: Path) -> Iterator[StackProcess]:
         Observer.name,
         "observer",
         (
-            *(sys.executable, "-m", "hmcs_local.demo.observer", "--instance", "observer"),
+            *(sys.executable, "-m", "hmcs_demo.observer", "--instance", "observer"),
             *("--router", stack.router, "--cell", CELL, "--output", str(recording)),
         ),
         {"OMP_NUM_THREADS": "1", **environment},

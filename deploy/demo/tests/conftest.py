@@ -14,8 +14,8 @@ from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
 from hmcs.task import load_task
-from hmcs_local.demo.measure import Measured, measure
-from hmcs_local.demo.recording import (
+from hmcs_demo.measure import Measured, measure
+from hmcs_demo.recording import (
     Beliefs,
     Commands,
     Fixtures,
@@ -26,7 +26,7 @@ from hmcs_local.demo.recording import (
     Steps,
     table,
 )
-from hmcs_local.demo.summary import RunFacts, Summary, summarize
+from hmcs_demo.summary import RunFacts, Summary, summarize
 
 RATE_HZ = 100.0
 MS = 1_000_000

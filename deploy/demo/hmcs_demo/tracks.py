@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hmcs.arrays import Array
 from hmcs.motion.paths import Path
-from hmcs_local.demo.truth import Segment
+from hmcs_demo.truth import Segment
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]

@@ -18,9 +18,9 @@ from matplotlib.patches import Patch
 
 from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.recognition.scoring import NONE
-from hmcs_local.demo.measure import Measured
-from hmcs_local.demo.summary import Summary
-from hmcs_local.demo.tracks import Track, recognized
+from hmcs_demo.measure import Measured
+from hmcs_demo.summary import Summary
+from hmcs_demo.tracks import Track, recognized
 
 COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
 """Told apart by all kinds of color vision; states beyond them begin again."""

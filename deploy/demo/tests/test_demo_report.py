@@ -7,9 +7,9 @@ import matplotlib.image
 import pytest
 
 from hmcs.recognition.model import Model
-from hmcs_local.demo.measure import Measured
-from hmcs_local.demo.report import lines, page, write_report
-from hmcs_local.demo.summary import Summary, described
+from hmcs_demo.measure import Measured
+from hmcs_demo.report import lines, page, write_report
+from hmcs_demo.summary import Summary, described
 
 CONTRACT = {
     *("steps", "missing_steps", "lost_messages", "refused_messages", "state_accuracy"),

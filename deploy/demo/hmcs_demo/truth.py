@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.scoring import NONE
-from hmcs_local.demo.recording import Motions
+from hmcs_demo.recording import Motions
 
 IntArray = NDArray[np.int64]
 
