@@ -18,6 +18,7 @@ from hmcs_demo.cpu import CpuMeter
 from hmcs_demo.observer import Observer
 from hmcs_demo.progress import PROGRESS, Progress, ProgressLine
 from hmcs_demo.truth import RunError
+from hmcs_local.compose import own_compose
 from hmcs_local.connecting import open_observer
 from hmcs_local.observer import Sighting, look
 from hmcs_local.processes import StackProcess
@@ -76,6 +77,8 @@ def play(plan: Plan, folder: Path, recording: Path, line: ProgressLine) -> Playe
     process it started is ended.
     """
     stack = LocalStack(
+        # Whatever other stack the folder it is called in may describe.
+        own_compose(),
         services=SERVICES,
         scale={CLASSIFIER: CLASSIFIERS},
         router="tcp/127.0.0.1:0",

@@ -13,6 +13,7 @@ import yaml
 
 from hmcs.errors import UserError
 
+COMPOSE = "compose.yaml"
 ROUTER = "router"
 """The service that is the router: the launcher has it inside itself."""
 
@@ -71,14 +72,28 @@ class StackSpec:
 
 
 def find_compose(start: Path) -> Path:
-    """Return the compose.yaml of this checkout: in `start`, above it, or above this package.
+    """Return the compose.yaml in `start` or above it, else the one that came with this package.
 
     Raises ComposeError where there is none.
     """
-    for folder in (start.resolve(), *start.resolve().parents, *Path(__file__).resolve().parents):
-        if (folder / "compose.yaml").is_file():
-            return folder / "compose.yaml"
-    raise ComposeError(f"no compose.yaml in {start} or above it: name one with --compose FILE")
+    for folder in (start.resolve(), *start.resolve().parents):
+        if (folder / COMPOSE).is_file():
+            return folder / COMPOSE
+    return own_compose()
+
+
+def own_compose() -> Path:
+    """Return the compose.yaml that came with this package.
+
+    A wheel has it inside the package, a checkout at the root of the repository. Raises ComposeError
+    where neither is there.
+    """
+    for folder in Path(__file__).resolve().parents:
+        if (folder / COMPOSE).is_file():
+            return folder / COMPOSE
+    raise ComposeError(
+        f"no {COMPOSE} came with hmcs-local: install it anew, or name a file with --compose FILE"
+    )
 
 
 def load_compose(path: Path, variables: Mapping[str, str]) -> StackSpec:
