@@ -90,3 +90,14 @@ QOS_PROFILES: dict[type[Message], QosProfile] = {
     ),
 }  # fmt: skip
 """The profile of every published message; questions and answers travel by Zenoh's queries."""
+
+
+def profile_of(message_type: type[Message]) -> QosProfile:
+    """Return how a message travels; raises ValueError for one that is not published."""
+    try:
+        return QOS_PROFILES[message_type]
+    except KeyError:
+        raise ValueError(
+            f"{message_type.__name__} is not published: it has no profile in hmcs.bus.qos "
+            f"(those that have: {', '.join(sorted(m.__name__ for m in QOS_PROFILES))})"
+        ) from None

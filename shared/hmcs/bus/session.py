@@ -16,7 +16,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Executor
 from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Self, TypeVar
 
 import zenoh
 
@@ -26,12 +26,14 @@ from hmcs.bus.config import BusSettings
 from hmcs.bus.connecting import BusUnavailableError, StoppedError, connect
 from hmcs.bus.counters import Counters
 from hmcs.bus.keys import ANY, Keys, check_name
+from hmcs.bus.links import Links
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.loop import Loop
 from hmcs.bus.mailbox import Arrival, KeepAll, KeepLast, Listening, Mailbox
 from hmcs.bus.messages import Envelope, Message, Origin, Source
-from hmcs.bus.presence import Present, is_token, present
-from hmcs.bus.qos import QOS_PROFILES, QosProfile
+from hmcs.bus.presence import Present, present
+from hmcs.bus.publisher import Publisher, declare_publisher
+from hmcs.bus.qos import profile_of
 from hmcs.bus.questions import (
     Answer,
     RequestRefusedError,
@@ -43,7 +45,9 @@ from hmcs.bus.questions import (
 from hmcs.bus.reading import Reader, Received
 from hmcs.bus.rights import Rights, check_right
 from hmcs.bus.timers import NS_PER_S, Timer, Timers
+from hmcs.bus.tokens import TOKENS_BOUND, Token, TokenWatch, refuse_token
 from hmcs.bus.wire import encode
+from hmcs.bus.zenoh_callbacks import arrival_of, on_thread
 
 __all__ = [
     "Answer",
@@ -58,58 +62,9 @@ __all__ = [
     "Token",
 ]
 
-TOKENS_BOUND = 4096
-"""Tokens that one watch follows: a cell has a few dozen processes, each with a handful."""
-
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R")
-T = TypeVar("T")
-
-
-class Publisher(Generic[M]):
-    """Publishes one type of message on one key; made by `Bus.publisher`."""
-
-    def __init__(
-        self,
-        publisher: zenoh.Publisher,
-        stamp: Callable[[Origin | None], Envelope],
-        counters: Counters,
-        sender: bytes,
-    ) -> None:
-        self._publisher = publisher
-        self._stamp = stamp
-        self._counters = counters
-        self._sender = sender
-
-    def put(self, body: M, origin: Origin | None = None) -> Envelope:
-        """Publish `body`; returns the envelope it got.
-
-        While there is no router the message is discarded, and its receivers will miss its number.
-        """
-        envelope = self._stamp(origin)
-        self._publisher.put(encode(body, envelope), attachment=self._sender)
-        self._counters.sent[body.SCHEMA] += 1
-        return envelope
-
-    @property
-    def matching(self) -> bool:
-        """Whether anybody subscribes to it now."""
-        # The status itself is always truthy; its annotation as a bool is Zenoh's mistake.
-        return bool(getattr(self._publisher.matching_status, "matching"))  # noqa: B009
-
-
-class Token:
-    """A liveliness token: others see its key until it is withdrawn or this process is gone."""
-
-    def __init__(self, token: zenoh.LivelinessToken) -> None:
-        self._token: zenoh.LivelinessToken | None = token
-
-    def withdraw(self) -> None:
-        """Take it back; a second time does nothing."""
-        if self._token is not None:
-            self._token.undeclare()  # type: ignore[no-untyped-call]
-            self._token = None
 
 
 class Bus:
@@ -168,16 +123,7 @@ class Bus:
         self._numbers: defaultdict[str, itertools.count[int]] = defaultdict(itertools.count)
         # Zenoh undeclares what nobody holds.
         self._declared: list[object] = []
-
-        def link_event(event: zenoh.TransportEvent) -> None:
-            # Told by the event: what the session says of itself lags behind it.
-            peer, opened = str(event.transport.zid), event.kind == zenoh.SampleKind.PUT
-            self._mailbox.put(lambda: self._link_changed(peer, opened))
-
-        self._declared.append(
-            session.info.declare_transport_events_listener(_on_thread(link_event))
-        )
-        self._links = {str(zid) for zid in self._reached()}
+        self._links = Links(session, settings, log, self._mailbox)
 
     def __enter__(self) -> Self:
         return self
@@ -199,11 +145,7 @@ class Bus:
     @property
     def connected(self) -> bool:
         """Whether the router (or, in direct mode, anybody) is reached now."""
-        return bool(self._reached())
-
-    def _reached(self) -> list[zenoh.ZenohId]:
-        info = self._session.info
-        return [*info.routers_zid(), *(info.peers_zid() if self.settings.direct else ())]
+        return self._links.connected
 
     # --- publish and subscribe --------------------------------------------------------------------
 
@@ -214,15 +156,9 @@ class Bus:
         """
         if key.endswith(f"/{ANY}"):
             key = key.removesuffix(ANY) + self.source.instance
-        profile = _profile(message_type)
+        profile = profile_of(message_type)
         check_right(self.rights, "says", key)
-        publisher = self._session.declare_publisher(
-            key,
-            priority=getattr(zenoh.Priority, profile.priority.upper()),
-            congestion_control=getattr(zenoh.CongestionControl, profile.congestion.upper()),
-            reliability=getattr(zenoh.Reliability, profile.reliability.upper()),
-            express=False,
-        )
+        publisher = declare_publisher(self._session, key, profile)
         self.publishes.append(key)
         sender = self.source.boot.encode()
         return Publisher(publisher, self._stamps(key), self.counters, sender)
@@ -234,7 +170,7 @@ class Bus:
 
         What is no message of `message_type` is refused, counted and logged.
         """
-        keep_last = _profile(message_type).delivery == "keep_last"
+        keep_last = profile_of(message_type).delivery == "keep_last"
         check_right(self.rights, "hears", key)
         # Each subscription follows sequence numbers by itself: it sees every message anew.
         reader = Reader(self.counters, self._limited)
@@ -250,9 +186,9 @@ class Bus:
         largest_bytes = BOUNDS[message_type].size_bytes
 
         def arrive(sample: zenoh.Sample) -> None:
-            box.arrive(_arrival(sample, largest_bytes))
+            box.arrive(arrival_of(sample, largest_bytes))
 
-        self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
+        self._declared.append(self._session.declare_subscriber(key, on_thread(arrive)))
         self.subscribes.append(key)
 
     def listen(self, key: str, handler: Callable[[Arrival], None], every_s: float = 0.02) -> None:
@@ -266,10 +202,10 @@ class Bus:
         listening = Listening(handler, lambda: self._reader.overflowed(key))
 
         def arrive(sample: zenoh.Sample) -> None:
-            listening.arrive(_arrival(sample, LARGEST_PUBLISHED_BYTES))
+            listening.arrive(arrival_of(sample, LARGEST_PUBLISHED_BYTES))
 
         self.every(every_s, listening.hand_on)
-        self._declared.append(self._session.declare_subscriber(key, _on_thread(arrive)))
+        self._declared.append(self._session.declare_subscriber(key, on_thread(arrive)))
         self.subscribes.append(key)
 
     # --- questions --------------------------------------------------------------------------------
@@ -304,7 +240,7 @@ class Bus:
             if not self._answering.submit(work, aside):
                 refuse_busy(query, key, stamps)
 
-        self._declared.append(self._session.declare_queryable(key, _on_thread(arrive)))
+        self._declared.append(self._session.declare_queryable(key, on_thread(arrive)))
         self.answers.append(key)
 
     def in_loop(self, work: Callable[[], R]) -> R:
@@ -357,28 +293,14 @@ class Bus:
         an impossible name is refused and counted.
         """
         check_right(self.rights, "watches", key)
-        living: set[str] = set()
-
-        def change(token: str, alive: bool) -> None:
-            if alive == (token in living):
-                return
-            if not is_token(self.keys, token):
-                self._refuse_token(token)
-                return
-            if alive and len(living) >= TOKENS_BOUND:
-                self._limited.warning(
-                    "tokens", "too many tokens: one more is left out", token=token
-                )
-                return
-            (living.add if alive else living.discard)(token)
-            handler(token, alive)
+        watch = TokenWatch(self.keys, handler, self.counters, self._limited)
 
         def arrive(sample: zenoh.Sample) -> None:
             token, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-            self._mailbox.put(lambda: change(token, alive))
+            self._mailbox.put(lambda: watch.change(token, alive))
 
         self._declared.append(
-            self._session.liveliness().declare_subscriber(key, _on_thread(arrive), history=True)
+            self._session.liveliness().declare_subscriber(key, on_thread(arrive), history=True)
         )
 
     def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
@@ -397,12 +319,8 @@ class Bus:
         )
         found = present(self.keys, (str(sample.key_expr) for sample in samples[:TOKENS_BOUND]))
         for token in found.strangers:
-            self._refuse_token(token)
+            refuse_token(token, self.counters, self._limited)
         return found
-
-    def _refuse_token(self, token: str) -> None:
-        self.counters.count_refused("presence", token)
-        self._limited.warning("token", "presence under an impossible name: refused", token=token)
 
     # --- the loop ---------------------------------------------------------------------------------
 
@@ -442,40 +360,3 @@ class Bus:
             return Envelope(source=source, seq=next(numbers), origin=origin)
 
         return stamp
-
-    def _link_changed(self, peer: str, opened: bool) -> None:
-        was_connected = bool(self._links)
-        (self._links.add if opened else self._links.discard)(peer)
-        if bool(self._links) != was_connected:
-            self._log.warning(
-                "connected again" if opened else "connection lost: going on by itself",
-                extra={"router": self.settings.router},
-            )
-
-
-def _profile(message_type: type[Message]) -> QosProfile:
-    try:
-        return QOS_PROFILES[message_type]
-    except KeyError:
-        raise ValueError(
-            f"{message_type.__name__} is not published: it has no profile in hmcs.bus.qos "
-            f"(those that have: {', '.join(sorted(m.__name__ for m in QOS_PROFILES))})"
-        ) from None
-
-
-def _arrival(sample: zenoh.Sample, largest_bytes: int) -> Arrival:
-    """Return a sample as it arrived; of one that is too large its size alone.
-
-    To copy it would hold up every thread of the process.
-    """
-    now_ns = time.monotonic_ns()
-    payload, attachment = sample.payload, sample.attachment
-    size = len(payload)
-    sender = attachment.to_bytes() if attachment is not None and len(attachment) <= 64 else b""
-    data = payload.to_bytes() if size <= largest_bytes else b""
-    return Arrival(str(sample.key_expr), data, now_ns, sender, size_bytes=size)
-
-
-def _on_thread(callback: Callable[[T], None]) -> zenoh.handlers.Callback[T]:
-    """Return a Zenoh handler that calls `callback` on the thread that received."""
-    return zenoh.handlers.Callback(callback, indirect=False)
