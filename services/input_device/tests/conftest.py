@@ -18,8 +18,11 @@ from hmcs.bus.messages import Message, Motion, Step
 from hmcs.bus.router import open_router
 from hmcs.bus.session import Bus, BusSettings, Received
 from hmcs.motion.demonstrations import Demonstration, write_csv
+from hmcs_input_device import guarded, press_gate
+from hmcs_input_device import service as service_module
 from hmcs_input_device.service import InputDevice
 from hmcs_input_device.settings import InputDeviceSettings
+from support.hand_device import Hand
 
 DEADLINE_S = 60.0
 LOG = logging.getLogger("test")
@@ -103,3 +106,27 @@ def make_desk(router: str) -> Iterator[Callable[..., Desk]]:
     """Bring up an input device with these settings."""
     with ExitStack() as stack:
         yield lambda **settings: Desk(router, stack, **settings)
+
+
+@pytest.fixture
+def play(make_desk: Callable[..., Desk], line_file: Path) -> Callable[..., Desk]:
+    """Bring up an input device that plays the line."""
+    settings = {
+        "source": "recorded",
+        "demonstration": line_file,
+        "lead_in_s": 0.2,
+        "rate_hz": 100.0,
+        "dead_zone_m": 0.02,
+    }
+    return lambda **changes: make_desk(**(settings | changes))
+
+
+@pytest.fixture
+def hand(monkeypatch: pytest.MonkeyPatch) -> Hand:
+    """A device that a hand moves, under the name `hand`; nothing counts as a hang."""
+    device = Hand()
+    monkeypatch.setattr(service_module, "BUILT_IN", {"hand": lambda *_: device})
+    # A busy machine may hold this test up; what becomes of a hang is tested without a clock.
+    monkeypatch.setattr(press_gate, "HANG_S", 60.0)
+    monkeypatch.setattr(guarded, "FROZEN_S", 60.0)
+    return device
