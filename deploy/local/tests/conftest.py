@@ -1,4 +1,4 @@
-"""A small stack of fake services, described as the real one is."""
+"""Small stacks of fake services, described as the real one is, and commands run in them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 import yaml
@@ -28,9 +29,16 @@ from hmcs.bus.messages import (
     LoadModel,
 )
 from hmcs.bus.session import Bus, RequestRefusedError
+from hmcs.recognition.model_file import save_model
+from hmcs.task import Task
+from hmcs_local import deploying
 from hmcs_local.command import main
+from hmcs_local.connecting import open_operator
 from hmcs_local.control import ControlServer
+from hmcs_local.deploying import Agreement
 from hmcs_local.stack import LocalStack
+from support.deployed import CELL, TASK, UP_WITHIN_S, Cell, Describe, Served
+from support.made_up import line_model
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -241,3 +249,49 @@ def hmcs(
         return subprocess.CompletedProcess(words, int(ended.value.code or 0), said.out, said.err)
 
     return run
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    """Model files: `mine`, `yours`, and another model of the name `mine`."""
+    task = Task.model_validate(TASK)
+    made = {}
+    for file, name, length_m in (
+        ("mine", "mine", 0.5),
+        ("yours", "yours", 0.5),
+        ("2", "mine", 0.4),
+    ):
+        made[file] = tmp_path / f"{file}.hmcs"
+        points = np.array([[0.0, 0, 0], [length_m, 0, 0]])
+        save_model(line_model(name, task, points), made[file])
+    return made
+
+
+@pytest.fixture
+def stack(
+    write_compose: Callable[..., Path],
+    service: Describe,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[LocalStack]:
+    """A stack whose only process is no recognizer; recognizers can be started in it."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    place = {"HMCS_ROUTER": "tcp/router:7447", "HMCS_CELL": CELL}
+    path = write_compose(a=service(), recognizer=service(environment=place, scale=0))
+    with LocalStack(path, router="tcp/127.0.0.1:0", folder=tmp_path / "up") as stack:
+        yield stack
+
+
+@pytest.fixture
+def bus(stack: LocalStack) -> Iterator[Bus]:
+    with open_operator(stack.router, CELL) as bus:
+        # It shows the tokens of others as well.
+        bus.rights = None
+        yield bus
+
+
+@pytest.fixture
+def cell(stack: LocalStack, bus: Bus, served: Served, monkeypatch: pytest.MonkeyPatch) -> Cell:
+    monkeypatch.setattr(deploying, "watched", lambda *_: Agreement(0, 0))
+    monkeypatch.setattr(deploying, "READY_WITHIN_S", UP_WITHIN_S)
+    return Cell(stack, bus, served)
