@@ -1,11 +1,12 @@
 # Each target does all set-up itself; it needs CPython 3.11 with venv, and nothing else.
-# PYTHON=/path/to/python3.11 chooses the Python, OUTPUT=DIR the folder of the demo's report.
+# PYTHON=/path/to/python3.11 chooses the Python, PYTHON=auto lets uv download one where none is at
+# hand, OUTPUT=DIR chooses the folder of the demo's report.
 
 PYTHON ?=
 VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.synced
-MANIFESTS := uv.lock pyproject.toml deploy/install_uv.py $(wildcard */pyproject.toml */*/pyproject.toml)
+MANIFESTS := uv.lock pyproject.toml deploy/find_python.sh deploy/install_uv.py $(wildcard */pyproject.toml */*/pyproject.toml)
 UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 
 # Their processes have deadlines to meet: one stack at a time, nothing of ours beside it, and before
@@ -79,14 +80,7 @@ $(READY): $(MANIFESTS)
 	@set -e; \
 	is_311() { "$$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1; }; \
 	if ! is_311 $(RUN)/python; then \
-	  python=; \
-	  for candidate in $(if $(PYTHON),"$(PYTHON)",python3.11 python3 python); do \
-	    if is_311 "$$candidate"; then python=$$candidate; break; fi; \
-	  done; \
-	  if [ -z "$$python" ]; then \
-	    echo "HMCS needs CPython 3.11 and found $(if $(PYTHON),another at $(PYTHON),none): install it, or name it: make PYTHON=/path/to/python3.11" >&2; \
-	    exit 1; \
-	  fi; \
+	  python=$$(sh deploy/find_python.sh $(if $(PYTHON),"$(PYTHON)")); \
 	  rm -rf $(VENV); \
 	  if ! "$$python" -m venv $(VENV); then \
 	    rm -rf $(VENV); \

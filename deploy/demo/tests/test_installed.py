@@ -1,4 +1,4 @@
-"""`hmcs` outside of the repository, as who has nothing but the wheels of all distributions has it."""
+"""`hmcs` outside of the repository, installed from the wheels of all distributions."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def distributions() -> set[str]:
     """The names of all distributions of the repository, as wheels bear them."""
     manifests = [
         tomllib.loads(path.read_text(encoding="utf-8"))
-        for path in ROOT.glob("*/**/pyproject.toml")
-        if ".venv" not in path.parts
+        for folder in ("shared", "services", "deploy")
+        for path in (ROOT / folder).rglob("pyproject.toml")
     ]
     return {each["project"]["name"].replace("-", "_") for each in manifests}
 

@@ -1,0 +1,189 @@
+"""How `make` finds the Python it makes .venv with, in a folder where every program is a fake."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import subprocess
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+OTHER_PYTHON = """#!/bin/sh
+# Answers as a Python does that is not 3.11; what it installs is the fake uv.
+here=$(dirname "$0")
+case "$1 $2" in
+  "-c "*) exit 1 ;;
+  "-m venv") mkdir -p "$3/bin"; cp "$0" "$3/bin/python" ;;
+  *install_uv.py*) cp "$FAKES/a-uv" "$here/uv"; echo "$here" >> "$FAKES/uv-installed" ;;
+esac
+"""
+PYTHON_311 = OTHER_PYTHON.replace("exit 1", "exit 0")
+UV = """#!/bin/sh
+# As uv does, it prints no path where it is to be quiet.
+echo "$UV_PYTHON_DOWNLOADS: $*" >> "$FAKES/uv-called"
+case "$1 $2" in
+  "python install") [ ! -e "$FAKES/no-network" ] || { echo "no network" >&2; exit 2; } ;;
+  "python find") case "$*" in *quiet*) ;; *) echo "$FAKES/downloaded" ;; esac ;;
+esac
+"""
+NEEDED = ("cp", "dirname", "make", "mkdir", "mktemp", "rm", "sh", "touch")
+
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
+
+
+class Machine:
+    """A machine whose PATH has fakes and a few real tools; this Makefile is in its folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.bin = folder / "bin"
+        self.bin.mkdir()
+        (folder / "tmp").mkdir()
+        for tool in NEEDED:
+            (self.bin / tool).symlink_to(shutil.which(tool) or tool)
+        self.has("a-uv", UV, at=folder)
+        self.has("downloaded", PYTHON_311, at=folder)
+        (folder / "deploy").mkdir()
+        for name in ("Makefile", "uv.lock", "pyproject.toml"):
+            shutil.copy(ROOT / name, folder)
+        for name in ("find_python.sh", "install_uv.py"):
+            shutil.copy(ROOT / "deploy" / name, folder / "deploy")
+
+    def has(self, name: str, script: str, at: Path | None = None) -> None:
+        """Put a program on PATH."""
+        program = (at or self.bin) / name
+        program.write_text(script, encoding="utf-8")
+        program.chmod(0o755)
+
+    def run(self, *command: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(self.bin / command[0]), *command[1:]],
+            cwd=self.folder,
+            env={
+                "PATH": str(self.bin),
+                "FAKES": str(self.folder),
+                "TMPDIR": str(self.folder / "tmp"),
+            },
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    def find_python(self, *asked: str) -> subprocess.CompletedProcess[str]:
+        return self.run("sh", "deploy/find_python.sh", *asked)
+
+    def noted(self, name: str) -> list[str]:
+        """What a fake has written down."""
+        file = self.folder / name
+        return file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)
+
+
+@pytest.mark.parametrize("asked", [(), ("auto",)])
+@pytest.mark.parametrize("name", ["python3.11", "python3", "python"])
+def test_python_311_at_hand_is_taken_and_nothing_is_downloaded(
+    machine: Machine, asked: tuple[str, ...], name: str
+) -> None:
+    machine.has("uv", UV)
+    machine.has("python3", OTHER_PYTHON)
+    machine.has(name, PYTHON_311)
+    assert machine.find_python(*asked).stdout == f"{name}\n"
+    assert machine.noted("uv-called") == []
+
+
+@pytest.mark.parametrize("asked", [(), ("python3",), ("/no/such place/python",)])
+def test_without_leave_nothing_is_downloaded_and_one_line_says_how_to_give_it(
+    machine: Machine, asked: tuple[str, ...]
+) -> None:
+    machine.has("uv", UV)
+    machine.has("python3", OTHER_PYTHON)
+    done = machine.find_python(*asked)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    for told in (*asked, "needs CPython 3.11", "PYTHON=/path/to/python3.11", "demo PYTHON=auto"):
+        assert told in done.stderr
+    assert machine.noted("uv-called") == []
+
+
+def test_with_leave_the_uv_on_the_path_downloads_one(machine: Machine) -> None:
+    machine.has("uv", UV)
+    machine.has("python3", OTHER_PYTHON)
+    assert machine.find_python("auto").stdout == f"{machine.folder / 'downloaded'}\n"
+    install, find = machine.noted("uv-called")
+    assert install.startswith("automatic: python install")
+    assert find.startswith("automatic: python find")
+    assert install.split()[-1] == find.split()[-1] == "3.11"
+    assert machine.noted("uv-installed") == []
+
+
+@pytest.mark.parametrize("name", ["python3", "python"])
+def test_with_leave_and_without_uv_another_python_installs_it_for_the_download_alone(
+    machine: Machine, name: str
+) -> None:
+    machine.has(name, OTHER_PYTHON)
+    assert machine.find_python("auto").stdout == f"{machine.folder / 'downloaded'}\n"
+    assert len(machine.noted("uv-installed")) == 1
+    assert list((machine.folder / "tmp").iterdir()) == []
+
+
+def _nothing_at_all(_: Machine) -> None:
+    pass
+
+
+def _no_venv(machine: Machine) -> None:
+    machine.has("python3", "#!/bin/sh\nexit 1\n")
+
+
+def _no_network(machine: Machine) -> None:
+    machine.has("uv", UV)
+    (machine.folder / "no-network").touch()
+
+
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [
+        (_nothing_at_all, "could not get uv"),
+        (_no_venv, "could not get uv"),
+        (_no_network, "could not download it"),
+    ],
+)
+def test_download_that_fails_says_why_and_leaves_nothing(
+    machine: Machine, state: Callable[[Machine], None], told: str
+) -> None:
+    state(machine)
+    done = machine.find_python("auto")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert told in done.stderr.splitlines()[-1]
+    assert list((machine.folder / "tmp").iterdir()) == []
+
+
+def test_make_sets_up_with_the_python_that_was_downloaded(machine: Machine) -> None:
+    machine.has("uv", UV)
+    refused = machine.run("make", "setup")
+    assert refused.returncode
+    assert "make demo PYTHON=auto" in refused.stderr
+    assert not (machine.folder / ".venv").exists()
+    done = machine.run("make", "setup", "PYTHON=auto")
+    assert done.returncode == 0, done.stderr
+    assert (machine.folder / ".venv/.synced").exists()
+    sync = machine.noted("uv-called")[-1]
+    assert sync.startswith("never: sync --frozen")
+
+
+def test_uv_is_installed_as_the_lock_file_has_it() -> None:
+    spec = importlib.util.spec_from_file_location("install_uv", ROOT / "deploy/install_uv.py")
+    assert spec is not None
+    assert spec.loader is not None
+    install_uv = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(install_uv)
+    text = (ROOT / "uv.lock").read_text(encoding="utf-8")
+    (uv,) = (each for each in tomllib.loads(text)["package"] if each["name"] == "uv")
+    expected = (uv["version"], [wheel["hash"] for wheel in uv["wheels"]])
+    assert install_uv.locked_uv(text) == expected
