@@ -12,8 +12,7 @@ from hmcs.fixtures.regions.tool_shape import tool_shape_of
 from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Recognition, StepEvidence
-from hmcs.recognition.segment_filter.recognizer import Precision
+from hmcs.recognition.recognizer import Precision, Recognition, StepEvidence
 
 NS_PER_S = 1_000_000_000
 

@@ -7,8 +7,8 @@ here, so what runs over the bus is what runs in process.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Collection
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 
 Integers = NDArray[np.int32]
+Precision = Literal["float32", "float64"]
+"""Of evidence on its way from layer to layer."""
 
 _log = logging.getLogger(__name__)
 _TOLERANCE = 1e-3
@@ -38,6 +40,24 @@ class StepEvidence(NamedTuple):
     """P(leaving before step t | steps s..t−1), 0 for s = t, shape (p,)."""
     log_ratio: Array
     """Tempered log-likelihood ratio of step t to the background given no exit, shape (p,)."""
+
+    def rounded(self, precision: Precision) -> StepEvidence:
+        """Return the evidence as doubles that a message of this precision can carry."""
+        return self._replace(
+            exit=_rounded(self.exit, precision), log_ratio=_rounded(self.log_ratio, precision)
+        )
+
+    def without(self, gestemes: Collection[int]) -> StepEvidence:
+        """Return the evidence as if nothing held the gestemes of these indices."""
+        kept = ~np.isin(self.pair_gesteme, list(gestemes))
+        return StepEvidence(
+            self.step,
+            tuple(g for g in self.gestemes if g not in gestemes),
+            self.pair_gesteme[kept],
+            self.pair_start[kept],
+            self.exit[kept],
+            self.log_ratio[kept],
+        )
 
 
 class TaskBelief(NamedTuple):
@@ -77,6 +97,10 @@ class Recognizer(Protocol):
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         ...
+
+
+PassEvidence = Callable[[StepEvidence], StepEvidence]
+"""From the evidence the gesteme level made of a step to that which reaches the task level."""
 
 
 class BadStepError(ValueError):
@@ -145,6 +169,10 @@ class Guarded:
             self._tell(f"the recognizer failed ({self._failure}): it begins anew with step {index}")
         # One that fails at every step is reported once.
         self._failure, self._told = None, True
+
+
+def _rounded(values: Array, precision: Precision) -> Array:
+    return values.astype(precision, copy=False).astype(np.float64, copy=False)
 
 
 def _check(recognition: Recognition) -> None:

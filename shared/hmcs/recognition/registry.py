@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from hmcs.errors import UserError, first_problem
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Guarded, Recognizer
+from hmcs.recognition.recognizer import Guarded, PassEvidence, Recognizer
 from hmcs.recognition.segments import Segment
 from hmcs.task import Task
 
@@ -56,6 +56,9 @@ class RecognizerSpec(NamedTuple):
     """Makes a fresh recognizer of a model; with True, one that may begin in any state."""
     check: Callable[[Any, Task], None] = lambda _knowledge, _task: None
     """Raises ValueError where knowledge does not fit the task or itself."""
+    layered: Callable[[Model, bool, PassEvidence], Recognizer] | None = None
+    """Makes a fresh recognizer whose evidence goes through a function on its way from the gesteme
+    level to the task level; None for a kind without evidence."""
 
 
 @cache

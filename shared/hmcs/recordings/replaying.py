@@ -15,7 +15,7 @@ from hmcs.bus.wire import schema_of
 from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
-from hmcs.recognition.segment_filter.recognizer import Precision
+from hmcs.recognition.recognizer import Precision
 from hmcs.recordings.as_live import AsLive
 from hmcs.recordings.beliefs import Beliefs, Believed, Packed, Packer
 from hmcs.recordings.inspection import unread

@@ -123,7 +123,7 @@ def lacking(
     said: list[Logged], model: Model, lost: Callable[[int], frozenset[int]]
 ) -> list[Logged]:
     """The same cell, whose task HMM did not get some evidence in time."""
-    layered = SegmentFilterRecognizer(model, precision="float32")
+    layered = SegmentFilterRecognizer(model, passed=lambda made: made.rounded("float32"))
     task = layered.task
     made: list[Logged] = []
     step = None

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.arrays import Array
+from hmcs_laboratory.single_gestemes.even_points import evenly
 
 
 def directions(positions: Array) -> Array:
@@ -15,16 +16,6 @@ def directions(positions: Array) -> Array:
     moves = np.diff(positions, axis=0)
     lengths = np.linalg.norm(moves, axis=1, keepdims=True)
     return np.asarray(moves / np.where(lengths > 0, lengths, 1.0))
-
-
-def evenly(positions: Array, count: int) -> Array:
-    """Return `count` of the positions from the first to the last, evenly by index, (count, D).
-
-    Between two of them it is interpolated.
-    """
-    given = np.linspace(0.0, 1.0, len(positions))
-    wanted = np.linspace(0.0, 1.0, count)
-    return np.stack([np.interp(wanted, given, column) for column in positions.T], axis=1)
 
 
 def shape_and_length(positions: Array, count: int = 12) -> Array:

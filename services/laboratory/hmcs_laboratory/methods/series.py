@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.arrays import Array
-from hmcs_laboratory.methods.features import evenly, flat, labels
+from hmcs_laboratory.methods.features import flat, labels
 from hmcs_laboratory.methods.libraries import peer
 from hmcs_laboratory.methods.whole import Examples
+from hmcs_laboratory.single_gestemes.even_points import evenly
 
 LEAST_SAMPLES = 9
 """MiniRocket takes no series shorter than this."""

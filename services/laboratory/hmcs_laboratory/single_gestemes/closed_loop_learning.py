@@ -30,7 +30,7 @@ from hmcs_laboratory.single_gestemes.closed_loop import (
     wanted_direction,
 )
 from hmcs_laboratory.single_gestemes.even_points import length_of, step_lengths
-from hmcs_laboratory.single_gestemes.mean_paths import ahead, mean_path, normals, padded
+from hmcs_laboratory.single_gestemes.mean_paths import ahead, normals, padded, smoothed_mean_path
 from hmcs_laboratory.single_gestemes.step_errors import Spread, errors, fitted_spread
 
 _ITERATIONS = 6
@@ -110,7 +110,7 @@ def fit_closed_loop(
     """
     own = [[positions - positions[0] for positions in motion] for motion in by_motion]
     step = float(np.mean(np.concatenate([step_lengths(p) for motion in own for p in motion])))
-    paths = padded([mean_path(motion, step, settings.smoothing) for motion in own])
+    paths = padded([smoothed_mean_path(motion, step, settings.smoothing) for motion in own])
     if all(len(motion) == 1 for motion in own):
         return _from_one_each(own, paths, step, settings)
     spread = settings.spread_steps * step
@@ -168,7 +168,7 @@ def _followed(
     performed.sort(key=lambda pair: -len(own[pair[0]][pair[1]]))
     motions = [own[m][k] for m, k in performed]
     others = [[p for j, p in enumerate(own[m]) if j != k] for m, k in performed]
-    paths = padded([mean_path(rest, step, settings.smoothing) for rest in others])
+    paths = padded([smoothed_mean_path(rest, step, settings.smoothing) for rest in others])
     motion = np.array([m for m, _ in performed])
     phases, parts = phases_at_start(len(motions)), []
     for t in range(len(motions[0]) - 1):

@@ -14,7 +14,7 @@ from hmcs_laboratory.single_gestemes.closed_loop import Paths, unit
 from hmcs_laboratory.single_gestemes.even_points import evenly, length_of, step_lengths
 
 
-def mean_path(performances: Sequence[Array], step: float, smoothing: float) -> Array:
+def smoothed_mean_path(performances: Sequence[Array], step: float, smoothing: float) -> Array:
     """Return the smoothed mean at equal shares of time, as nodes about a step apart, shape (n, D).
 
     Minimizes the squared distances to the performances and `smoothing` times the squared second

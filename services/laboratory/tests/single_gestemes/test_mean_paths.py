@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hmcs_laboratory.single_gestemes.even_points import evenly
-from hmcs_laboratory.single_gestemes.mean_paths import ahead, mean_path, normals, padded
+from hmcs_laboratory.single_gestemes.mean_paths import ahead, normals, padded, smoothed_mean_path
 
 CORNER = np.vstack([np.linspace([0, 0], [9, 0], 10), np.linspace([9, 0], [9, 9], 10)[1:]]).astype(
     float
@@ -35,7 +35,7 @@ def smoothest(performances: list[np.ndarray], smoothing: float) -> np.ndarray:
 def test_the_mean_path_is_the_least_of_what_it_weighs(smoothing: float) -> None:
     rng = np.random.default_rng(0)
     shown = [CORNER + rng.normal(0, 0.2, CORNER.shape) * (np.arange(19) > 0)[:, None] for _ in "ab"]
-    nodes = mean_path(shown, 0.01, smoothing)
+    nodes = smoothed_mean_path(shown, 0.01, smoothing)
     expected = smoothest(shown, smoothing)
     np.testing.assert_allclose(nodes[0], 0.0, atol=1e-9)
     np.testing.assert_allclose(nodes[-1], expected[-1] - expected[0], atol=1e-3)
@@ -45,7 +45,7 @@ def test_the_mean_path_is_the_least_of_what_it_weighs(smoothing: float) -> None:
 
 
 def test_nodes_are_a_step_apart() -> None:
-    nodes = mean_path([CORNER], 0.5, 0.0)
+    nodes = smoothed_mean_path([CORNER], 0.5, 0.0)
     lengths = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
     # Across the corner it is a little shorter.
     np.testing.assert_allclose(np.delete(lengths, lengths.argmin()), 0.5, atol=0.02)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Recognizer
+from hmcs.recognition.recognizer import PassEvidence, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segment_filter.checking import check_segment_filter
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
@@ -19,6 +19,10 @@ def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return SegmentFilterRecognizer(model, anywhere=anywhere)
 
 
+def _layered(model: Model, anywhere: bool, passed: PassEvidence) -> Recognizer:
+    return SegmentFilterRecognizer(model, anywhere=anywhere, passed=passed)
+
+
 KIND = RecognizerSpec(
     name="segment-filter",
     summary="exact filter over (task state, segment start, gesteme phase) with an unknown state",
@@ -28,4 +32,5 @@ KIND = RecognizerSpec(
     learn=_learn,
     recognizer=_recognizer,
     check=check_segment_filter,
+    layered=_layered,
 )

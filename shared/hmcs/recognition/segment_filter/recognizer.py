@@ -7,22 +7,16 @@ runs in process.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
-from hmcs.recognition.recognizer import Recognition, StepEvidence
+from hmcs.recognition.recognizer import PassEvidence, Recognition, StepEvidence
 from hmcs.recognition.segment_filter.filter import FilterSettings, SegmentFilter
 from hmcs.recognition.segment_filter.gestemes import GestemeBank, GestemeParameters, Scoring
 from hmcs.recognition.task_chain import chain_of
 from hmcs.recognition.unknown import AlarmSettings, UnknownAlarm
-
-Precision = Literal["float32", "float64"]
-"""Of evidence on its way from layer to layer."""
 
 
 class SegmentFilterModel(NamedTuple):
@@ -85,22 +79,14 @@ class SegmentFilterRecognizer:
     """The whole layered HMM in one object: gesteme models in parallel, the task above them."""
 
     def __init__(
-        self, model: Model, *, anywhere: bool = False, precision: Precision = "float64"
+        self, model: Model, *, anywhere: bool = False, passed: PassEvidence = lambda made: made
     ) -> None:
-        """Begin as `TaskFilter` does; evidence is rounded to `precision` between the layers."""
+        """Begin as `TaskFilter` does; `passed` says what evidence reaches the task level."""
         self._bank = bank_of(model)
-        self._precision = precision
+        self._passed = passed
         self.task = TaskFilter(model, anywhere=anywhere)
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
-        exact = self._bank.step(step)
-        evidence = exact._replace(
-            exit=_rounded(exact.exit, self._precision),
-            log_ratio=_rounded(exact.log_ratio, self._precision),
-        )
+        evidence = self._passed(self._bank.step(step))
         return self.task.step(evidence)._replace(evidence=evidence)
-
-
-def _rounded(values: Array, precision: Precision) -> Array:
-    return values.astype(precision, copy=False).astype(np.float64, copy=False)
