@@ -123,6 +123,23 @@ def gesteme_shares(chain: TaskChain, gestemes: int) -> Array:
     return shares
 
 
+def state_given_gesteme(chain: TaskChain, gestemes: int) -> Array:
+    """Return P(state | gesteme) before anything is seen, shape (S, M); columns sum to one.
+
+    By how often the task's chain visits each state in as many segments as there are states. A
+    gesteme of no state says nothing of them.
+    """
+    visits, segment = np.zeros_like(chain.initial), chain.initial
+    for _ in chain.initial:
+        visits = visits + segment
+        segment = segment @ chain.transition
+    shares = gesteme_shares(chain, gestemes)
+    joint = visits[:, None] * shares
+    joint = np.where(joint.any(axis=0), joint, shares)
+    joint = np.where(joint.any(axis=0), joint, 1.0)
+    return np.asarray(joint / joint.sum(axis=0))
+
+
 def check_task_hmm(task_hmm: TaskHmm, states: int, gestemes: int) -> None:
     """Raise ValueError where the arrays are not for so many states and gestemes, or hold no
     probabilities above zero."""

@@ -37,9 +37,10 @@ from hmcs_baselines.task_level import (
     check_task_hmm,
     gesteme_shares,
     learn_task_level,
+    state_given_gesteme,
 )
 
-Evidence = Literal["winner", "soft"]
+Evidence = Literal["winner", "soft", "none"]
 
 
 class LayeredHmmSettings(NamedTuple):
@@ -59,7 +60,9 @@ class LayeredHmmSettings(NamedTuple):
     """The test, where restarts are found by it."""
     evidence: Evidence = "winner"
     """What the task HMM is shown: the most probable gesteme, as in the thesis, or all of them with
-    their probabilities (soft), which halves the false switches."""
+    their probabilities (soft), which halves the false switches. None: there is no task HMM, and
+    states are as probable as the gestemes they are performed with, those that share one by how
+    often the task visits them."""
     task: TaskLevelSettings = TaskLevelSettings()
     """How the task HMM is learned."""
 
@@ -68,7 +71,8 @@ class TwoLevels(NamedTuple):
     """What gesteme HMMs and the task HMM above them know."""
 
     gestemes: Gestemes
-    task: TaskHmm
+    task: TaskHmm | None
+    """None where it is shown nothing."""
     restart: Restart
     cusum: CusumSettings
     evidence: Evidence
@@ -88,6 +92,8 @@ def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLev
         settings.gestemes,
         complete=settings.restart == "network",
     )
+    if settings.evidence == "none":
+        return TwoLevels(gestemes, None, settings.restart, settings.cusum, "none")
     told = []
     for demonstration in data.demonstrations:
         labeled = labeled_steps(task, demonstration)
@@ -110,11 +116,17 @@ def check_two_levels(knowledge: TwoLevels, task: Task) -> None:
     check_gestemes(knowledge.gestemes, task)
     check_within("drift_nats", knowledge.cusum.drift_nats, 0.0, LARGEST)
     check_within("threshold_nats", knowledge.cusum.threshold_nats, 0.0, LARGEST)
-    check_task_hmm(knowledge.task, len(task.states), len(task.gestemes))
+    if (knowledge.task is None) != (knowledge.evidence == "none"):
+        raise ValueError(
+            f"field 'evidence' is {knowledge.evidence!r}: expected 'none' exactly where there is "
+            "no task HMM"
+        )
+    if knowledge.task is not None:
+        check_task_hmm(knowledge.task, len(task.states), len(task.gestemes))
 
 
 class TwoLevelRecognizer:
-    """Both levels in one object."""
+    """Both levels in one object, or the gesteme level alone."""
 
     def __init__(self, model: Model, *, anywhere: bool) -> None:
         """Begin as the task does or, with `anywhere`, in any of its states."""
@@ -122,22 +134,27 @@ class TwoLevelRecognizer:
         self._classifier = GestemeClassifier(
             knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum
         )
-        self._task = TaskLevel(knowledge.task, anywhere=anywhere)
         self._evidence = knowledge.evidence
-        shares = gesteme_shares(chain_of(model.task), len(model.task.gestemes))
-        self._outside = np.where(shares > 0, 0.0, -1.0)
+        chain, gestemes = chain_of(model.task, anywhere=anywhere), len(model.task.gestemes)
+        self._task: TaskLevel | None = None
+        if knowledge.task is None:
+            self._state_given_gesteme = state_given_gesteme(chain, gestemes)
+        else:
+            self._task = TaskLevel(knowledge.task, anywhere=anywhere)
+            self._outside = np.where(gesteme_shares(chain, gestemes) > 0, 0.0, -1.0)
         self._beliefs = BeliefBuilder()
 
     def step(self, step: Step) -> Recognition:
         """Take the next step; steps come in order, without gaps."""
         classification = self._classifier.step(step)
-        states, log_likelihood = self._task.step(passed_up(classification, self._evidence))
+        if self._task is None:
+            cells = self._state_given_gesteme * classification.gestemes
+            states, log_likelihood = cells.sum(axis=1), classification.log_likelihood
+        else:
+            cells = self._outside + classification.gestemes
+            states, log_likelihood = self._task.step(passed_up(classification, self._evidence))
         return self._beliefs.recognition(
-            step.index,
-            states,
-            self._outside + classification.gestemes,
-            log_likelihood,
-            classification.start,
+            step.index, states, cells, log_likelihood, classification.start
         )
 
 

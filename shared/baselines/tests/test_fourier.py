@@ -7,7 +7,7 @@ from hmcs.motion.steps import steps_of_demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.registry import recognizer_of
 from hmcs.task import Task
-from hmcs_baselines.fourier import FourierSettings
+from hmcs_baselines.layered_hmm import FOURIER
 from hmcs_baselines.observing import ObservationSettings
 from hmcs_baselines.symbols import Fourier
 from support.lessons import lesson_task
@@ -40,7 +40,7 @@ def waved(seed: int) -> Demonstration:
 
 
 def test_gestemes_are_told_apart_by_how_fast_they_turn_where_directions_alone_are_alike() -> None:
-    settings = FourierSettings(ObservationSettings(symbols=8))
+    settings = FOURIER.settings()._replace(observing=ObservationSettings(symbols=8))
     demonstrations = [waved(seed) for seed in range(4)]
     model = learn(waves_task(), demonstrations, settings, recognizer="fourier")
     recognizer = recognizer_of(model)
@@ -51,7 +51,8 @@ def test_gestemes_are_told_apart_by_how_fast_they_turn_where_directions_alone_ar
 
 
 def test_all_gestemes_share_one_code_book_of_window_features() -> None:
-    settings = FourierSettings(ObservationSettings(symbols=8, fourier=Fourier(4, 2)))
+    observing = ObservationSettings(symbols=8, fourier=Fourier(4, 2))
+    settings = FOURIER.settings()._replace(observing=observing)
     model = learn(waves_task(), [waved(0)], settings, recognizer="fourier")
     observing, hmms = model.knowledge.gestemes
     assert observing.encoding.centers.shape == (8, 3 * 4)

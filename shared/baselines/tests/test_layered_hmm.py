@@ -219,6 +219,26 @@ def test_no_symbol_is_less_probable_than_the_floor() -> None:
             assert table[:count].min() == pytest.approx(floor)
 
 
+def test_without_evidence_there_is_no_task_hmm_and_given_restarts_still_begin_segments() -> None:
+    model, steps = taught(GIVEN._replace(evidence="none")), steps_performed(50)
+    assert model.knowledge.task is None
+    recognizer = recognizer_of(model)
+    begins = [segment[0].index for segment in in_segments(steps)]
+    for step in steps:
+        belief = recognizer.step(step).belief
+        assert belief.segment_start == max(begin for begin in begins if begin <= step.index)
+        # Two states share a gesteme, and nothing tells them apart.
+        np.testing.assert_allclose(belief.states[1], belief.states[3], atol=1e-12)
+
+
+@pytest.mark.parametrize("evidence", ["none", "winner"])
+def test_a_task_hmm_is_known_exactly_where_there_is_evidence_for_it(evidence: str) -> None:
+    other = "winner" if evidence == "none" else "none"
+    knowledge = taught(GIVEN._replace(evidence=evidence)).knowledge
+    with pytest.raises(ValueError, match="evidence"):
+        KIND.check(knowledge._replace(evidence=other), lesson_task())
+
+
 @pytest.mark.parametrize(
     ("part", "field"), [("task", "transition"), ("task", "gestemes"), ("chains", "initial")]
 )

@@ -1,18 +1,23 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
+import pytest
 
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segments import labeled_steps
+from hmcs.recognition.serialization import Content, ContentError, from_arrays
 from hmcs.recognition.task_chain import TaskChain, chain_of
 from hmcs_baselines.gesteme_hmms import GestemeScores
+from hmcs_baselines.layered_hmm import ONLINE_NETWORK
 from hmcs_baselines.observing import Observer
-from hmcs_baselines.online_network import state_given_gesteme
 from hmcs_baselines.restarting import NetworkLevel
+from hmcs_baselines.task_level import state_given_gesteme
+from hmcs_baselines.two_levels import LayeredHmmSettings, TwoLevels
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 
@@ -24,7 +29,7 @@ def taught() -> Model:
 
 def test_states_are_as_probable_as_the_gestemes_they_are_performed_with() -> None:
     model = taught()
-    gestemes = model.knowledge
+    gestemes = model.knowledge.gestemes
     observer, scores = Observer(gestemes.observing, model.axes), GestemeScores(gestemes.hmms)
     level, recognizer = NetworkLevel(gestemes.hmms.chains), recognizer_of(model)
     for step in steps_performed(50):
@@ -43,6 +48,22 @@ def test_gestemes_are_recognized_whatever_their_order() -> None:
     for step, gesteme in zip(steps, true, strict=True):
         right += recognizer.step(step).belief.gesteme == gesteme
     assert right / len(steps) > 0.8
+
+
+def test_it_is_the_layered_hmm_on_directions_without_a_task_hmm() -> None:
+    settings = LayeredHmmSettings(observations="direction", evidence="none")
+    layered = learn(
+        lesson_task(), [performed(seed) for seed in range(4)], settings, recognizer="lhmm"
+    )
+    one, other = recognizer_of(layered), recognizer_of(taught())
+    for step in steps_performed(50):
+        np.testing.assert_array_equal(one.step(step).belief.states, other.step(step).belief.states)
+
+
+@pytest.mark.parametrize("plain", [None, [], "x", {"observing": {}}, {"observing": {}, "hmms": 1}])
+def test_knowledge_of_an_older_form_that_is_broken_is_refused(plain: Any) -> None:
+    with pytest.raises(ContentError):
+        from_arrays(TwoLevels, Content(ONLINE_NETWORK.from_older(plain), {}))
 
 
 def sequence(gestemes: list[int], initial: int = 0, *, around: bool = False) -> TaskChain:

@@ -158,7 +158,8 @@ def _model(source: Path, fields: dict[str, Any], manifest: Manifest, archive: Ar
         own = array_names(manifest.knowledge)
         arrays = archive.arrays([*guides, *own], [f"{_TURN}{k}" for k in gestemes])
         knowledge: Any = from_arrays(
-            kind.knowledge, Content(manifest.knowledge, {name: arrays[name] for name in own})
+            kind.knowledge,
+            Content(kind.from_older(manifest.knowledge), {name: arrays[name] for name in own}),
         )
         kind.check(knowledge, manifest.task)
         turns = tuple(arrays.get(f"{_TURN}{k}") for k in gestemes)

@@ -46,8 +46,9 @@ class RecognizerSpec(NamedTuple):
     """One line."""
     source: str
     """Who described it, where."""
-    settings: type
-    """The choices of learning it: a NamedTuple whose defaults are good without tuning."""
+    settings: Callable[[], Any]
+    """Returns the choices of learning it, good without tuning: a NamedTuple class, or a function
+    that makes one with values of its own."""
     knowledge: type
     """What it learns: a NamedTuple of arrays, numbers, strings and such tuples."""
     learn: Callable[[TrainingData], Any]
@@ -59,6 +60,9 @@ class RecognizerSpec(NamedTuple):
     layered: Callable[[Model, bool, PassEvidence], Recognizer] | None = None
     """Makes a fresh recognizer whose evidence goes through a function on its way from the gesteme
     level to the task level; None for a kind without evidence."""
+    from_older: Callable[[Any], Any] = lambda plain: plain
+    """Brings the knowledge of a model file, plain as `serialization` has it, into the form of
+    today where an older version of the kind wrote it in another."""
 
 
 @cache
@@ -93,7 +97,7 @@ def settings_of(kind: RecognizerSpec, given: Mapping[str, str]) -> Any:
     defaults = kind.settings()
     try:
         chosen = _replaced(defaults, given)
-        return TypeAdapter(kind.settings).validate_python(chosen)
+        return TypeAdapter(type(defaults)).validate_python(chosen)
     except KeyError as error:
         names = ", ".join(name for name, _ in setting_values(defaults))
         raise UserError(
