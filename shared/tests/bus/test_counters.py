@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.bus.counters import LARGEST_GAP, REMEMBERED_BOOTS, Sequences
+from hmcs.bus.counters import LARGEST_GAP, Sequences
 
 
 @given(st.integers(0, 1000), st.lists(st.integers(0, 5)))
@@ -79,8 +79,9 @@ def test_a_jump_that_nothing_confirms_is_forgotten_once_the_source_goes_on() -> 
 
 
 def test_a_loss_of_each_of_many_sources_is_seen() -> None:
+    """A hundred processes with ten keys each."""
     sequences = Sequences()
-    boots = [str(number) for number in range(REMEMBERED_BOOTS)]
+    boots = [str(number) for number in range(1000)]
     for boot in boots:
         sequences.note("key", boot, 0)
     assert [sequences.note("key", boot, 3) for boot in boots] == [2] * len(boots)

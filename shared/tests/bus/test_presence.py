@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import signal
 import time
+from types import SimpleNamespace
+
+import zenoh
 
 PRESENT = """
 import sys, time
@@ -30,6 +33,25 @@ def test_those_already_there_come_first_and_a_withdrawn_one_goes(join) -> None:
     watch(observer, 2, seen)
     key = robot.keys.presence("robot", "r")
     assert seen == [(key, True), (key, False)]
+
+
+def test_a_token_that_is_only_confirmed_is_not_told_again(join, monkeypatch) -> None:
+    observer = join("observer")
+    key = observer.keys.presence("robot", "r")
+    seen: list[tuple[str, bool]] = []
+    heard = []
+    liveliness = SimpleNamespace(
+        declare_subscriber=lambda _, heard_of, **__: heard.append(heard_of)
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(observer, "_session", SimpleNamespace(liveliness=lambda: liveliness))
+        observer.watch(observer.keys.presence(), lambda key, alive: seen.append((key, alive)))
+    kinds = [zenoh.SampleKind.DELETE, zenoh.SampleKind.PUT, zenoh.SampleKind.PUT]
+    for kind in (*kinds, *kinds):
+        heard[0].callback(SimpleNamespace(key_expr=key, kind=kind))
+    while observer.pump(0.0):
+        pass
+    assert seen == [(key, True), (key, False), (key, True)]
 
 
 def test_alive_tells_who_is_there_now_each_once(join, until) -> None:

@@ -77,6 +77,22 @@ def test_everybody_asked_answers(served, asker, until) -> None:
     assert sorted(answer.body.detail for answer in answers) == ["a", "b", "c"]
 
 
+def test_who_asks_everybody_is_not_asked_itself(served, join, until) -> None:
+    served("b", lambda _: Done(detail="b"))
+    asker = join("robot", "a")
+    asked: list[ActivateRecognizer] = []
+
+    def answered(question: ActivateRecognizer) -> Done:
+        asked.append(question)
+        return Done(detail="a")
+
+    with ThreadPoolExecutor(1) as aside:
+        asker.answer("activate", ActivateRecognizer, answered, aside=aside)
+        answers = ask(asker, "*", until)
+    assert [answer.body.detail for answer in answers] == ["b"]
+    assert not asked
+
+
 def test_nobody_there_is_no_answer(asker) -> None:
     assert asker.ask(asker.keys.rpc("robot", "a", "activate"), Ask(), Done) == []
 

@@ -91,6 +91,18 @@ def test_where_the_newest_wins_a_slow_receiver_gets_it_alone_and_nothing_counts_
     assert not receiver.counters.lost
 
 
+def test_a_message_that_may_be_dropped_does_not_travel_express(pair, until) -> None:
+    """Both together would lose up to a third of the messages of a link that several share."""
+    sender, receiver, publisher = pair
+    samples: list[zenoh.Sample] = []
+    listening = receiver._session.declare_subscriber(receiver.keys.step, samples.append)
+    publisher(Step, sender.keys.step).put(step(0))
+    until(lambda: samples)
+    listening.undeclare()
+    drops = samples[0].congestion_control == zenoh.CongestionControl.DROP
+    assert not (drops and samples[0].express)
+
+
 def test_two_subscriptions_of_one_bus_both_get_every_message(pair) -> None:
     sender, receiver, publisher = pair
     first, second = [], []

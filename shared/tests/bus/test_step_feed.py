@@ -22,6 +22,7 @@ from hmcs.driving import TAKEOVER_S
 
 MOVE = np.array([0.01, 0.0, 0.0])
 S = 1_000_000_000
+ORIGIN = Origin(boot="boot-1", seq=0, captured_ns=0)
 
 
 def step(index: int) -> Step:
@@ -35,6 +36,8 @@ class FakeBus:
         self.keys = Keys("cell")
         self.kept, self.boot, self.questions = kept, boot, []
         self.hangs = False
+        self.damage: dict[str, Any] = {}
+        """Fields of its next answers that are otherwise than they should be."""
         self.refused: Counter[str] = Counter()
         self.counters = SimpleNamespace(count_refused=self._count_refused)
         self.handlers: dict[str, Callable[[Received[Any]], None]] = {}
@@ -60,6 +63,7 @@ class FakeBus:
             steps=tuple(step(i) for i in chosen),
             origins=(origin,) * len(chosen),
         )
+        body = body.model_copy(update=self.damage)
         return [Answer(Envelope(source=self.source(), seq=0), body)]
 
     def source(self, instance: str = "a", boot: str | None = None) -> Source:
@@ -274,6 +278,24 @@ def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> N
     assert listener.told[-5:] == [("step", k) for k in range(5)][-5:]
     bus.hear(5)
     assert listener.steps[-1] == 5
+
+
+DAMAGED: dict[str, dict[str, Any]] = {
+    "a step is missing": {"steps": (step(4), step(6), step(7)), "origins": (ORIGIN,) * 3},
+    "a sample is missing": {"origins": (ORIGIN,) * 4},
+    "of another boot than its sender's": {"clock": "boot-x"},
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED.values(), ids=DAMAGED)
+def test_an_answer_that_cannot_be_is_as_if_there_were_none(damage: dict[str, Any]) -> None:
+    bus = FakeBus(kept=range(3))
+    listener = Listener(bus)
+    bus.kept, bus.damage = range(8), damage
+    bus.hear(8)
+    assert listener.told[-2:] == [("restart", 8), ("step", 8)]
+    assert listener.steps == [0, 1, 2, 8]
+    assert Listener(bus).told == []
 
 
 @given(
