@@ -50,7 +50,6 @@ def mean_turns(
         given = continuous(turned)
         back = inverse(unit_quaternion(given[0]))
         since = continuous([product(each, back) for each in given])
-        since = since if since[0, 3] >= 0 else -since
         total += np.stack(
             [np.interp(shares, lengths / lengths[-1], column) for column in since.T], axis=1
         )

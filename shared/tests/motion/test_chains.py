@@ -7,8 +7,8 @@ from hmcs.motion.chains import chained, closed
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError
 
 
-def arc(name: str, turn: float, count: int = 50) -> Demonstration:
-    angle = np.linspace(0, turn, count)
+def arc(name: str, turn: float, count: int = 50, pace: float = 1.0) -> Demonstration:
+    angle = turn * np.linspace(0, 1, count) ** pace
     positions = np.stack([np.sin(angle), 1 - np.cos(angle), 0 * angle], axis=1)
     return Demonstration(name, np.linspace(3.0, 4.0, count), positions, (name,) * count)
 
@@ -40,8 +40,9 @@ def test_nothing_cannot_be_chained():
         chained("none", [], np.zeros(3))
 
 
-def test_a_closed_demonstration_ends_where_it_began_and_is_bent_evenly():
-    open_one = arc("a", 1.5)
+@pytest.mark.parametrize("pace", [1.0, 2.0], ids=["even", "ever faster"])
+def test_a_closed_demonstration_ends_where_it_began_and_is_bent_evenly(pace):
+    open_one = arc("a", 1.5, pace=pace)
     ring = closed(open_one)
     np.testing.assert_allclose(ring.positions[0], open_one.positions[0])
     np.testing.assert_allclose(ring.positions[-1], open_one.positions[0], atol=1e-12)

@@ -83,6 +83,15 @@ def test_a_jump_made_while_lifted_makes_no_step() -> None:
     np.testing.assert_allclose(step.displacement, (0, 0, 0.02))
 
 
+def test_a_hand_that_is_exactly_the_dead_zone_away_makes_a_step() -> None:
+    zone = DeadZone(0.5)
+    zone.push((0, 0, 0))
+    assert zone.push((np.nextafter(0.5, 0), 0, 0)) is None
+    step = zone.push((0.5, 0, 0))
+    assert step is not None
+    np.testing.assert_array_equal(step.displacement, (0.5, 0, 0))
+
+
 def test_motion_below_the_dead_zone_makes_no_step() -> None:
     assert steps_of(np.random.default_rng(0).uniform(-0.04, 0.04, (1000, 3)), 0.2) == []
 
