@@ -32,7 +32,6 @@ class Gathering:
         self._needed = frozenset(gestemes)
         self._deadline_ns = deadline_ns
         self._parts: dict[int, list[StepEvidence]] = {}
-        self._covered: dict[int, set[int]] = {}
         self._due_ns: dict[int, int] = {}
         self._early_until_ns: dict[int, int] = {}
         """Of steps released before their deadline, oldest first: until when evidence is in time."""
@@ -43,7 +42,6 @@ class Gathering:
     def restart(self, index: int) -> None:
         """Forget everything; step `index` is the next."""
         self._parts.clear()
-        self._covered.clear()
         self._due_ns.clear()
         self._early_until_ns.clear()
         self._next = index
@@ -63,12 +61,11 @@ class Gathering:
         step = evidence.step
         if step < self._next:
             return "duplicate" if now_ns <= self._early_until_ns.get(step, -1) else "late"
-        covered = self._covered.setdefault(step, set())
-        fresh = set(evidence.gestemes) - covered
+        parts = self._parts.setdefault(step, [])
+        fresh = set(evidence.gestemes) - _covered(parts)
         if not fresh:
             return "duplicate"
-        covered |= fresh
-        self._parts.setdefault(step, []).append(_only(evidence, fresh))
+        parts.append(_only(evidence, fresh))
         return "taken"
 
     def caught_up(self, now_ns: int) -> None:
@@ -84,7 +81,7 @@ class Gathering:
         step = self._next
         if step not in self._due_ns:
             return None
-        complete = self._needed <= self._covered.get(step, set())
+        complete = self._needed <= _covered(self._parts.get(step, []))
         due_ns = self._due_ns[step]
         if not complete and self._handled_until_ns < due_ns:
             return None
@@ -92,7 +89,6 @@ class Gathering:
         self._due_ns.pop(step)
         if complete:
             self._note_early(step, due_ns, now_ns)
-        self._covered.pop(step, None)
         return Released(_joined(step, self._parts.pop(step, [])), not complete)
 
     def _note_early(self, step: int, due_ns: int, now_ns: int) -> None:
@@ -104,6 +100,10 @@ class Gathering:
     def due_ns(self) -> int | None:
         """When the next step is released whatever is missing; None while no step waits."""
         return self._due_ns.get(self._next)
+
+
+def _covered(parts: list[StepEvidence]) -> set[int]:
+    return {gesteme for part in parts for gesteme in part.gestemes}
 
 
 def _only(evidence: StepEvidence, gestemes: set[int]) -> StepEvidence:

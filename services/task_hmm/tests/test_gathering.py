@@ -1,5 +1,7 @@
 """Gathering: whatever the order of arrival, each step is released once, in order, in time."""
 
+import weakref
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -84,12 +86,24 @@ def test_evidence_that_overtakes_its_step_waits_for_it():
     assert g.release(now_ns=1) is not None
 
 
-def test_evidence_for_a_step_released_at_its_deadline_is_late():
+@pytest.mark.parametrize("arrived_ns", [DEADLINE_NS, DEADLINE_NS + 1])
+def test_evidence_for_a_step_released_at_its_deadline_is_late(arrived_ns):
     g = gathering()
     g.begin(0, now_ns=0)
     g.caught_up(DEADLINE_NS)
     g.release(now_ns=DEADLINE_NS)
-    assert g.add(evidence(0, {0}), DEADLINE_NS + 1) == "late"
+    assert g.add(evidence(0, {0}), arrived_ns) == "late"
+
+
+def test_evidence_of_a_released_step_is_not_kept():
+    g = gathering()
+    held = evidence(0, {0, 1, 2})
+    kept = weakref.ref(held.log_ratio)
+    g.begin(0, now_ns=0)
+    g.add(held, 0)
+    assert g.release(now_ns=1) is not None
+    del held
+    assert kept() is None
 
 
 @given(st.lists(st.integers(0, DEADLINE_NS - 1), min_size=1, max_size=8), st.integers(0, 10**6))
