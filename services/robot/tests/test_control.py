@@ -102,9 +102,9 @@ def test_a_wall_takes_only_the_part_that_leads_out(bench: Any) -> None:
 def test_a_tool_that_is_drawn_along_a_wall_is_not_drawn_through_it(bench: Any) -> None:
     rig = bench()
     arm = rig.simulation.read()
-    at_wall = arm.tool.position + [1.0, rig.limits.wall_margin_m, 1.0]
+    at_wall = arm.tool.position + np.array([1.0, rig.limits.wall_margin_m, 1.0])
     rig.limits = replace(rig.limits, workspace_upper_m=at_wall)
-    beyond = arm.tool._replace(position=arm.tool.position + [0.0, 0.004, 0.003])
+    beyond = arm.tool._replace(position=arm.tool.position + np.array([0.0, 0.004, 0.003]))
     rig.carried = Following(beyond, np.zeros(6))
     made = arm.jacobian @ rig.follow(np.zeros(6)).joint_velocities
     assert made[1] <= 1e-6
