@@ -13,11 +13,16 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 # the rest of the machine. Without the right to that, nice warns and runs them all the same.
 WHOLE_STACKS := deploy/demo/tests $(addprefix tests/,bench end_to_end faults fuzz hosts)
 BEFORE_OTHERS := nice -n -10
+# Of these `make test` runs what everything else stands on; `make test-long` runs the rest, and the
+# studies and figures of the laboratory.
+SHORT_STACKS := tests/end_to_end/test_whole_stack.py tests/fuzz
+STUDIES := services/laboratory/tests
+IN_PARALLEL := -n auto --maxprocesses 4 --dist loadfile
 
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench safety peers test-browser pictures schemas manifests fuzz test-containers clean
+.PHONY: help setup demo test test-long lint bench safety peers test-browser pictures schemas manifests fuzz test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -28,10 +33,15 @@ setup: $(READY) ## make .venv from the lock file
 demo: $(READY) ## teach the demo task, run the whole stack on held-out human motion, write a report
 	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
 
-test: $(READY) ## every test but those in a browser or in containers; linting, types and imports are among them
-	@$(RUN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile \
-	    -m "not containers and not browser" $(addprefix --ignore=,$(WHOLE_STACKS)) || failed=1; \
-	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(WHOLE_STACKS) || failed=1; exit $${failed:-0}
+test: $(READY) ## units, contracts, types and imports, then one whole stack, also under hostile messages
+	@$(RUN)/python -m pytest $(IN_PARALLEL) -m "not containers and not browser" \
+	    $(addprefix --ignore=,$(WHOLE_STACKS) $(STUDIES)) || failed=1; \
+	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(SHORT_STACKS) || failed=1; exit $${failed:-0}
+
+test-long: $(READY) ## the other whole stacks (faults, several hosts, every recognizer) and the laboratory; half an hour
+	@$(RUN)/python -m pytest $(IN_PARALLEL) $(STUDIES) || failed=1; \
+	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(filter-out $(SHORT_STACKS),$(WHOLE_STACKS)) \
+	    $(addprefix --ignore=,$(SHORT_STACKS)) || failed=1; exit $${failed:-0}
 
 lint: $(READY) ## put the code in the house's format and name what is left to mend
 	@$(RUN)/ruff format .
