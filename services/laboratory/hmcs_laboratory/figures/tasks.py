@@ -3,49 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Picture
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
-from hmcs.arrays import Array
 from hmcs.recognition.learning import learn
-from hmcs.recognition.model import Model
-from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.scoring import Scores, pooled, score
-from hmcs_baselines.classifying import GestemeClassifier
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
 from hmcs_baselines.observing import ObservationSettings
 from hmcs_baselines.task_level import TaskLevelSettings
-from hmcs_baselines.two_levels import LayeredHmmSettings, TwoLevels
+from hmcs_baselines.two_levels import LayeredHmmSettings
 from hmcs_laboratory.data.hands import Count, Share
 from hmcs_laboratory.data.synthetic_tasks import five_states
-from hmcs_laboratory.data.tasks import Performance, TaskSet
-from hmcs_laboratory.figures.drawing import (
-    INK,
-    UNKNOWN_COLOR,
-    Drawn,
-    Number,
-    change_handle,
-    color_of,
-    counted,
-    draw_changes,
-    listed,
-    mark_of,
-    new_picture,
-)
+from hmcs_laboratory.data.tasks import TaskSet
+from hmcs_laboratory.figures.drawing import Drawn, Number, counted, listed
 from hmcs_laboratory.figures.drawn import DrawnOrderSettings, drawn_orders
+from hmcs_laboratory.figures.task_following import (
+    Believed,
+    Followed,
+    Integers,
+    believe,
+    follow,
+    margin_of,
+    names_of,
+)
+from hmcs_laboratory.figures.task_panels import draw_panels
 from hmcs_laboratory.figures.trajectories import TaskFigureSettings
 from hmcs_laboratory.study import StudySettings
-
-Integers = NDArray[np.int64]
-
-_LOWEST_NATS = -60.0
-"""State likelihoods so far below the best are not drawn: they would hide the others."""
 
 
 class LayeredSettings(StudySettings):
@@ -84,41 +67,6 @@ class DrawnFollowedSettings(DrawnOrderSettings, LayeredSettings):
     """Of figures 4.16 and 4.17."""
 
 
-class _Followed(NamedTuple):
-    """What the layered HMM made of a performance, restart given."""
-
-    log_alpha: Array
-    """log P(all steps so far, state), nats, shape (T, S)."""
-    states: Array
-    """P(state | all steps so far), shape (T, S)."""
-    winners: Integers
-    """The most probable gesteme since the restart, shape (T,)."""
-    margin_of_gestemes: float
-    """Mean difference of the two most probable gestemes."""
-
-    @property
-    def falls(self) -> Array:
-        """By how much the total likelihood falls with each step, nats, shape (T,)."""
-        total = np.logaddexp.reduce(self.log_alpha, axis=1)
-        return np.asarray(-np.diff(total, prepend=0.0))
-
-
-class _Believed(NamedTuple):
-    """What the segment filter made of it, no marks given."""
-
-    states: Array
-    """Shape (T, S)."""
-    unknown: Array
-    """Shape (T,)."""
-
-
-class _Names(NamedTuple):
-    states: tuple[str, ...]
-    gestemes: tuple[str, ...]
-    of_state: Integers
-    """Index of the gesteme of each state."""
-
-
 def five_states_followed(settings: FollowedSettings, rng: np.random.Generator) -> Drawn:
     """Draw figures 4.12 and 4.13: the five-state task followed, restart given."""
     data = five_states(settings, settings.noise, rng)
@@ -145,17 +93,17 @@ def _drawn(
     With `by_gesteme` a belief is right where its gesteme is: of a task in an order never seen, no
     more is true.
     """
-    task, names = learned.task, _names(learned)
+    task, names = learned.task, names_of(learned)
     layered, eager = (
         learn(task, learned.demonstrations, settings.layered(any_state), recognizer="lhmm")
         for any_state in (settings.any_state, settings.eager_any_state)
     )
     filtering = learn(task, learned.demonstrations)
-    followed = [_follow(layered, performance) for performance in shown.performances]
-    hurried = [_follow(eager, performance) for performance in shown.performances]
-    believed = [_believe(filtering, performance) for performance in shown.performances]
+    followed = [follow(layered, performance) for performance in shown.performances]
+    hurried = [follow(eager, performance) for performance in shown.performances]
+    believed = [believe(filtering, performance) for performance in shown.performances]
 
-    def judged(what: Sequence[_Followed] | Sequence[_Believed]) -> list[Scores]:
+    def judged(what: Sequence[Followed] | Sequence[Believed]) -> list[Scores]:
         truth = [performance.states for performance in shown.performances]
         likely = [each.states.argmax(axis=1) for each in what]
         if by_gesteme:
@@ -172,7 +120,7 @@ def _drawn(
     truth = names.of_state[shown.performances[0].states]
     changes = np.flatnonzero(np.diff(shown.performances[0].states)) + 1
     first = {name: own[0] for name, own in scores.items()}
-    picture = _panels(names, followed[0], believed[0], truth, changes, first)
+    picture = draw_panels(names, followed[0], believed[0], truth, changes, first)
     numbers: dict[str, Number] = {
         "steps": len(truth),
         "performances": len(shown.performances),
@@ -190,20 +138,12 @@ def _drawn(
     )
 
 
-def _names(data: TaskSet) -> _Names:
-    return _Names(
-        tuple(state.name for state in data.task.states),
-        tuple(gesteme.name for gesteme in data.task.gestemes),
-        data.gesteme_of_state,
-    )
-
-
-def _level_numbers(followed: _Followed, truth: Integers) -> dict[str, Number]:
+def _level_numbers(followed: Followed, truth: Integers) -> dict[str, Number]:
     wrong = followed.winners != truth
     falls = followed.falls
     return {
         "winning_gesteme_right": float((~wrong).mean()),
-        "lhmm_mean_margin": _margin(followed.states),
+        "lhmm_mean_margin": margin_of(followed.states),
         "gesteme_hmms_mean_margin": followed.margin_of_gestemes,
         "mean_fall_nats_gesteme_right": float(falls[~wrong].mean()) if (~wrong).any() else None,
         "mean_fall_nats_gesteme_wrong": float(falls[wrong].mean()) if wrong.any() else None,
@@ -211,7 +151,7 @@ def _level_numbers(followed: _Followed, truth: Integers) -> dict[str, Number]:
 
 
 def _found(
-    followed: _Followed, truth: Integers, scores: Mapping[str, Sequence[Scores]], what: str
+    followed: Followed, truth: Integers, scores: Mapping[str, Sequence[Scores]], what: str
 ) -> str:
     wrong, falls = followed.winners != truth, followed.falls
     fall = (
@@ -225,7 +165,7 @@ def _found(
         f"The winning gesteme HMM was right in {100 * (~wrong).mean():.0f} % of {len(truth)} "
         f"steps. The layered HMM, restarted at the true changes, had {_percent(layered[0])} of "
         f"{what} right and saw the changes {_delays(layered[0])} late. The two most probable "
-        f"differed by {_margin(followed.states):.2f} on average for its states, by "
+        f"differed by {margin_of(followed.states):.2f} on average for its states, by "
         f"{followed.margin_of_gestemes:.2f} for the gesteme HMMs. {fall}The segment filter, told "
         f"nothing, had {_percent(unmarked[0])} right and saw the changes {_delays(unmarked[0])} "
         f"late. Over all {len(layered)} performances: layered HMM {_pooled(layered)}; segment "
@@ -235,7 +175,7 @@ def _found(
 
 def _differs(
     settings: LayeredSettings,
-    followed: _Followed,
+    followed: Followed,
     truth: Integers,
     scores: Mapping[str, Sequence[Scores]],
     *,
@@ -265,34 +205,6 @@ def _differs(
     return " ".join(told)
 
 
-def _follow(model: Model, performance: Performance) -> _Followed:
-    knowledge: TwoLevels = model.knowledge
-    recognizer = recognizer_of(model)
-    gestemes = GestemeClassifier(knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum)
-    beliefs = [recognizer.step(step).belief for step in performance.steps]
-    classified = np.array([gestemes.step(step).gestemes for step in performance.steps])
-    states = np.array([belief.states for belief in beliefs])
-    total = np.cumsum([belief.log_likelihood for belief in beliefs])
-    with np.errstate(divide="ignore"):
-        log_alpha = total[:, None] + np.log(states)
-    return _Followed(log_alpha, states, classified.argmax(axis=1), _margin(classified))
-
-
-def _believe(model: Model, performance: Performance) -> _Believed:
-    recognizer = recognizer_of(model)
-    beliefs = [recognizer.step(step).belief for step in performance.unmarked().steps]
-    return _Believed(
-        np.array([belief.states for belief in beliefs]),
-        np.array([belief.unknown for belief in beliefs]),
-    )
-
-
-def _margin(rows: Array) -> float:
-    """Mean difference between the largest and the next of each row."""
-    ordered = np.sort(rows, axis=1)
-    return float((ordered[:, -1] - ordered[:, -2]).mean())
-
-
 def _scored(name: str, scores: Scores) -> dict[str, Number]:
     return {
         f"{name}_accuracy": scores.accuracy,
@@ -317,91 +229,3 @@ def _pooled(scores: Sequence[Scores]) -> str:
         f"{_percent(every)} right, 95 % of changes within {every.switch_delay(95):.0f} steps, "
         f"{every.false_switches_per_1000_steps:.1f} false switches in 1000 steps"
     )
-
-
-def _panels(
-    names: _Names,
-    followed: _Followed,
-    believed: _Believed,
-    truth: Integers,
-    changes: NDArray[np.intp],
-    scores: Mapping[str, Scores],
-) -> Picture:
-    picture = new_picture(10.4)
-    axes = picture.subplots(4, 1, sharex=True, height_ratios=[1.0, 1.0, 0.75, 1.0], squeeze=True)
-    raw, normalized, gestemes, ours = axes
-    at = np.arange(len(truth))
-    for state in range(len(names.states)):
-        style = _style(state)
-        raw.plot(at, followed.log_alpha[:, state], **style)
-        normalized.plot(at, followed.states[:, state], **style)
-        ours.plot(at, believed.states[:, state], **style)
-    ours.fill_between(at, believed.unknown, step="mid", color=UNKNOWN_COLOR, alpha=0.5, linewidth=0)
-    lowest = followed.log_alpha.max(axis=1).min() + _LOWEST_NATS
-    raw.set_ylim(max(float(followed.log_alpha.min()), float(lowest)) - 3.0, 3.0)
-    raw.set_title("Layered HMM, restart given: likelihood of each state")
-    raw.set_ylabel("log likelihood, nats")
-    normalized.set_title("The same, normalized")
-    for gesteme in range(len(names.gestemes)):
-        own = at[truth == gesteme]
-        left, right = own - 0.5, own + 0.5
-        gestemes.hlines(np.full(len(own), gesteme), left, right, color="#bbbbbb", linewidth=9)
-    gestemes.plot(at, followed.winners, color=INK, linestyle="", marker="o", ms=4)
-    gestemes.set_yticks(range(len(names.gestemes)), names.gestemes)
-    gestemes.set_ylim(-0.6, len(names.gestemes) - 0.4)
-    gestemes.set_title("Winning gesteme HMM (dots) and true gesteme (gray): input of the task HMM")
-    gestemes.set_ylabel("gesteme")
-    ours.set_title("Segment filter, no marks given: probability of each state")
-    ours.set_xlabel("step")
-    for ax, scored in ((normalized, scores["lhmm"]), (ours, scores["segment_filter"])):
-        ax.set_ylim(-0.03, 1.22)
-        ax.set_yticks([0.0, 0.5, 1.0])
-        ax.set_ylabel("probability")
-        _mark_delays(ax, changes, scored.switch_delays)
-    for ax in axes:
-        draw_changes(ax, changes.tolist())
-        ax.set_xlim(-0.5, len(at) - 0.5)
-    picture.legend(
-        handles=_legend(names),
-        loc="outside lower center",
-        ncols=len(names.states) + 2,
-        columnspacing=1.2,
-        handlelength=1.6,
-    )
-    return picture
-
-
-def _style(state: int) -> dict[str, Any]:
-    return {
-        "color": color_of(state),
-        "linewidth": 1.5,
-        "marker": mark_of(state),
-        "ms": 3.6,
-        "markevery": (state, 6),
-    }
-
-
-def _mark_delays(ax: Axes, changes: NDArray[np.intp], delays: NDArray[np.int64]) -> None:
-    for change, delay in zip(changes, delays, strict=True):
-        ax.annotate(
-            f"{delay:+d}".replace("-", "−") if delay else "0",
-            (change - 0.5, 1.2),
-            xytext=(3, 0),
-            textcoords="offset points",
-            va="top",
-            fontsize=9.0,
-        )
-
-
-def _legend(names: _Names) -> Sequence[Line2D | Patch]:
-    states = [
-        Line2D([], [], **{**_style(s), "markevery": None}, label=f"{name} ({gesteme})")
-        for s, (name, gesteme) in enumerate(
-            (name, names.gestemes[names.of_state[s]]) for s, name in enumerate(names.states)
-        )
-    ]
-    return [
-        *states,
-        Patch(color=UNKNOWN_COLOR, alpha=0.5, label="unknown"),
-        change_handle("true change; above, its delay in steps"),
-    ]
