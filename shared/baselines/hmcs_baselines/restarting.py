@@ -171,28 +171,33 @@ class CusumLevel:
 class NetworkLevel:
     """The online network of Li and Okamura (2003): every HMM is always being restarted.
 
-    α of all HMMs are kept on one scale. In each step the mean of what stands in the HMMs' last
-    (resetting) states is added to what is predicted for the first state of each (2.35).
+    α of all HMMs are kept on one scale, as of one HMM. In each step the mean of what stands in the
+    HMMs' last (resetting) states is added to what is predicted for the first state of each (2.35).
     """
 
     def __init__(self, chains: GestemeChains) -> None:
-        self._transition = chains.transition
-        self._last = (np.arange(len(chains.states)), chains.states - 1)
-        self._alpha = np.zeros_like(chains.initial)
+        models, states = self._shape = chains.initial.shape
+        each = np.arange(models)
+        network = np.zeros((models, states, models, states))
+        network[each, :, each] = chains.transition
+        network[each, chains.states - 1, :, 0] += 1.0 / models
+        network = network.reshape(models * states, models * states)
         # (2.34) at its scale.
-        self._alpha[:, 0] = 1.0 / len(self._alpha)
+        first = np.zeros((models, states))
+        first[:, 0] = 1.0 / models
+        predicted = first.ravel() @ network
+        self._filter = ForwardBank(predicted[None], network[None])
+        self._leaving = network.sum(axis=1)
+        self._predicted = float(predicted.sum())
 
     def step(self, index: int, log_emission: Array, *, mark: bool) -> Classification:
         """Take the next observation."""
-        predicted = np.einsum("mi,mij->mj", self._alpha, self._transition)
-        predicted[:, 0] += self._alpha[self._last].mean()
-        top = float(log_emission[predicted > 0].max())
-        joint = predicted * np.exp(np.minimum(log_emission - top, 0.0))
-        total = float(joint.sum())
-        self._alpha = joint / total
+        gain = float(self._filter.step(log_emission.reshape(1, -1))[0])
+        alpha = self._filter.states[0]
         # The reset states' mass counts twice, so a total is set against what was predicted.
-        log_likelihood = top + float(np.log(total / predicted.sum()))
-        return Classification(self._alpha.sum(axis=1), log_likelihood, None)
+        log_likelihood = gain - float(np.log(self._predicted))
+        self._predicted = float(alpha @ self._leaving)
+        return Classification(alpha.reshape(self._shape).sum(axis=1), log_likelihood, None)
 
 
 def _log_total(log_likelihoods: Array) -> float:

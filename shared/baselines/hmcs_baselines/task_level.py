@@ -20,8 +20,10 @@ from hmcs.recognition.checking import (
     check_within,
 )
 from hmcs.recognition.hmm.emissions import Discrete
+from hmcs.recognition.hmm.log_transitions import log_of
 from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.task_chain import TaskChain
+from hmcs_baselines.hmm.bank import ForwardBank
 from hmcs_baselines.hmm.soft_evidence import learn_task
 
 Integers = NDArray[np.int64]
@@ -101,19 +103,17 @@ class TaskLevel:
     def __init__(self, task_hmm: TaskHmm, *, anywhere: bool = False) -> None:
         """Begin as the task does or, with `anywhere`, in any state."""
         states = len(task_hmm.initial)
-        self._predicted = np.full(states, 1.0 / states) if anywhere else task_hmm.initial
-        self._hmm = task_hmm
+        initial = np.full(states, 1.0 / states) if anywhere else task_hmm.initial
+        self._filter = ForwardBank(initial[None], task_hmm.transition[None])
+        self._gestemes = task_hmm.gestemes
 
     def step(self, gestemes: Array) -> tuple[Array, float]:
         """Take a distribution over gestemes, shape (M,).
 
         Returns P(state | all so far), shape (S,), and log P(this | what came before), nats.
         """
-        joint = self._predicted * (self._hmm.gestemes @ gestemes)
-        total = float(joint.sum())
-        states = joint / total
-        self._predicted = states @ self._hmm.transition
-        return states, float(np.log(total))
+        gain = self._filter.step(log_of(self._gestemes @ gestemes)[None])
+        return self._filter.states[0], float(gain[0])
 
 
 def gesteme_shares(chain: TaskChain, gestemes: int) -> Array:

@@ -8,6 +8,7 @@ import pytest
 
 from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
+from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, save_model
@@ -63,12 +64,12 @@ def test_with_given_restarts_the_task_hmm_filters_the_winner_of_each_segment_alo
         [gesteme_likelihoods(model, segment).argmax(axis=1) for segment in in_segments(steps)]
     )
     task = model.knowledge.task
-    expected = inference.forward_scaled(
-        task.initial, task.transition, np.log(task.gestemes[:, winners]).T
+    log_states, log_scales, _ = inference.log_filtered(
+        task.initial, LogTransitions(task.transition), np.log(task.gestemes[:, winners]).T
     )
     recognizer = recognizer_of(model)
     begins = np.cumsum([0, *(len(segment) for segment in in_segments(steps))])
-    for step, states, log_scale in zip(steps, *expected, strict=True):
+    for step, states, log_scale in zip(steps, np.exp(log_states), log_scales, strict=True):
         belief = recognizer.step(step).belief
         np.testing.assert_allclose(belief.states, states, atol=1e-9)
         np.testing.assert_allclose(belief.log_likelihood, log_scale, rtol=1e-9)
@@ -82,11 +83,11 @@ def test_soft_evidence_is_the_posterior_of_the_gestemes() -> None:
     )
     shares = np.exp(likelihoods - np.logaddexp.reduce(likelihoods, axis=1, keepdims=True))
     task = model.knowledge.task
-    expected = inference.forward_scaled(
-        task.initial, task.transition, np.log(shares @ task.gestemes.T)
+    expected = inference.log_filtered(
+        task.initial, LogTransitions(task.transition), np.log(shares @ task.gestemes.T)
     )
     recognizer = recognizer_of(model)
-    for step, states in zip(steps, expected.states, strict=True):
+    for step, states in zip(steps, np.exp(expected.log_states), strict=True):
         np.testing.assert_allclose(recognizer.step(step).belief.states, states, atol=1e-9)
 
 

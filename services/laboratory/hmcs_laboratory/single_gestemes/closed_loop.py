@@ -197,7 +197,11 @@ def phases_at_start(pairs: int) -> Phases:
 def next_phases(
     paths: Paths, motion: Indices, phases: Phases, there: Array, spread: float
 ) -> tuple[Phases, Array]:
-    """Return the phases at the next place, (p, D), and the log of their normalizers, (p,)."""
+    """Return the phases at the next place, (p, D), and the log of their normalizers, (p,).
+
+    A forward recursion over the few nodes near the hand, which move along with it: one over all
+    nodes of all paths would cost many times as much.
+    """
     pairs = np.arange(len(motion))
     looked_at = phases.weights.shape[1]
     moved = np.zeros((len(motion), looked_at + len(_ADVANCE) - 1))

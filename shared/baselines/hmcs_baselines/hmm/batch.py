@@ -198,6 +198,10 @@ def _batch(models: Sequence[Hmm[Any]], sequences: Sequence[Sequence[Observations
 
 
 def _forward(batch: _Batch, log_emission: Array) -> _Forward:
+    """Filter all sequences of all models side by side, unscaled: that is what makes a batch quick.
+
+    A sequence too improbable for that is filtered alone, in logarithms.
+    """
     models, states, _ = log_emission.shape
     sequences = batch.lengths.shape[1]
     steps = log_emission.shape[2] // sequences

@@ -228,7 +228,8 @@ class _Bank:
     def _moved(self, state: _LayerState) -> Array:
         """Return log P(o_s..o_{t−1}, state i at t) for the starts that count at t, (S, K, N).
 
-        A window that slides carries the recursions from all its starts, so that none is redone.
+        A window that slides carries the recursions from all its starts, so that none is redone, as
+        it would be with the recursion of `inference` from the window's first observation on.
         """
         window = self._layer.window
         if state.seen == 0:

@@ -19,8 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hmcs.arrays import Array
-from hmcs.recognition.hmm.inference import ImpossibleSequenceError
-from hmcs.recognition.hmm.log_transitions import log_of
+from hmcs.recognition.hmm.inference import (
+    ImpossibleSequenceError,
+    LogFiltered,
+    log_backward,
+    log_filtered,
+)
+from hmcs.recognition.hmm.log_transitions import LogTransitions, log_of, log_sum
 from hmcs_baselines.hmm.durations import DurationError
 from hmcs_baselines.hmm.markov import States, checked_rows
 
@@ -114,23 +119,16 @@ def filtered(model: DurationHmm, log_emission: Array) -> Filtered:
     Raises DurationError for a wrong shape, ImpossibleSequenceError for observations that the model
     gives no probability.
     """
-    passed = _forward(model, log_emission)
-    return Filtered(_states_of(passed.log_states), passed.log_scales)
+    passed = _passed(model, _Ways(model), log_emission)
+    return Filtered(_states_of(passed.log_states, model), passed.log_scales)
 
 
 def smoothed(model: DurationHmm, log_emission: Array) -> Array:
     """Return γ: P(state i at t | all observations), shape (T, N). Raises as `filtered`."""
-    log_alpha, _, tops = _forward(model, log_emission)
-    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
-    log_beta = np.zeros_like(log_alpha)
-    for t in range(len(log_emission) - 2, -1, -1):
-        ahead = (log_emission[t + 1] - tops[t + 1])[:, None] + log_beta[t + 1]
-        ahead = np.where(np.isfinite(log_alpha[t + 1]), ahead, -np.inf)
-        entered = np.logaddexp.reduce(log_durations + ahead, axis=1)
-        log_beta[t, :, 0] = np.logaddexp.reduce(log_transition + entered, axis=1)
-        log_beta[t, :, 1:] = ahead[:, :-1]
-        log_beta[t] -= log_beta[t].max(where=np.isfinite(log_alpha[t]), initial=-np.inf)
-    return _states_of(log_alpha + log_beta)
+    ways = _Ways(model)
+    passed = _passed(model, ways, log_emission)
+    later = log_backward(passed, ways, _of_pairs(model, log_emission))
+    return _states_of(passed.log_states + later.log_states, model)
 
 
 def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
@@ -173,42 +171,44 @@ def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
     return Segmentation(segments, path, log_probability)
 
 
-class _Forward(NamedTuple):
-    log_states: Array
-    """log P(state i with r steps that remain at t | o_0..o_t), shape (T, N, D)."""
-    log_scales: Array
-    """log P(o_t | o_0..o_{t−1}), shape (T,)."""
-    tops: Array
-    """Largest log P(o_t | state) of the states that can be reached, shape (T,)."""
+class _Ways:
+    """The few ways between pairs (state, steps that remain), in the order of `expand`."""
+
+    def __init__(self, model: DurationHmm) -> None:
+        self._log_durations = log_of(model.durations)
+        self._segments = LogTransitions(model.transition)
+
+    def ahead(self, log_here: Array) -> Array:
+        here = log_here.reshape(self._log_durations.shape)
+        entered = self._segments.ahead(here[:, 0])[:, None] + self._log_durations
+        return np.asarray(np.logaddexp(entered, _remaining_less(here)).ravel())
+
+    def back(self, log_next: Array) -> Array:
+        following = log_next.reshape(self._log_durations.shape)
+        ended = self._segments.back(log_sum(self._log_durations + following, axis=1))
+        return np.concatenate([ended[:, None], following[:, :-1]], axis=1).ravel()
 
 
-def _forward(model: DurationHmm, log_emission: Array) -> _Forward:
-    """Filter in logarithms, each step by its own scale."""
+def _passed(model: DurationHmm, ways: _Ways, log_emission: Array) -> LogFiltered:
+    """The pairs (state, steps that remain) filtered, (T, N·D)."""
     _check_emission(model, log_emission)
-    log_durations, log_transition = log_of(model.durations), log_of(model.transition)
-    log_states = np.empty((len(log_emission), *log_durations.shape))
-    log_scales, tops = np.empty((2, len(log_emission)))
-    entered = log_of(model.initial)
-    stayed = np.full(log_durations.shape, -np.inf)
-    for t, log_likelihood in enumerate(log_emission):
-        moved = np.logaddexp(entered[:, None] + log_durations, stayed)
-        reachable = np.isfinite(moved).any(axis=1)
-        top = float(log_likelihood.max(where=reachable, initial=-np.inf))
-        if not np.isfinite(top):
-            raise _impossible(t)
-        joint = moved + (log_likelihood - top)[:, None]
-        scale = float(np.logaddexp.reduce(joint, axis=None))
-        log_states[t] = joint - scale
-        log_scales[t], tops[t] = scale + top, top
-        entered = np.logaddexp.reduce(log_states[t, :, :1] + log_transition, axis=0)
-        stayed = _remaining_less(log_states[t])
-    return _Forward(log_states, log_scales, tops)
+    initial = (model.initial[:, None] * model.durations).ravel()
+    try:
+        return log_filtered(initial, ways, _of_pairs(model, log_emission))
+    except ImpossibleSequenceError as error:
+        raise _impossible(error.step) from None
 
 
-def _states_of(log_joint: Array) -> Array:
-    """P(state i at t), shape (T, N), of log joint weights, shape (T, N, D)."""
-    joint = np.exp(log_joint - log_joint.max(axis=(1, 2), keepdims=True)).sum(axis=2)
-    return np.asarray(joint / joint.sum(axis=1, keepdims=True))
+def _of_pairs(model: DurationHmm, log_emission: Array) -> Array:
+    """log P(o_t | pair), shape (T, N·D): emissions are those of the state."""
+    return np.repeat(log_emission, model.durations.shape[1], axis=1)
+
+
+def _states_of(log_joint: Array, model: DurationHmm) -> Array:
+    """P(state i at t), shape (T, N), of log joint weights of pairs, shape (T, N·D)."""
+    joint = np.exp(log_joint - log_joint.max(axis=1, keepdims=True))
+    states = joint.reshape(-1, *model.durations.shape).sum(axis=2)
+    return np.asarray(states / states.sum(axis=1, keepdims=True))
 
 
 def _remaining_less(log_values: Array) -> Array:
@@ -232,7 +232,7 @@ def _check_emission(model: DurationHmm, log_emission: Array) -> None:
         )
 
 
-def _impossible(dead: int) -> ImpossibleSequenceError:
+def _impossible(dead: int | None) -> ImpossibleSequenceError:
     return ImpossibleSequenceError(
         f"the sequence is impossible under the model from its observation {dead} on: "
         "check durations, structural zeros and emission floors",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.arrays import Array
+from hmcs.recognition.hmm.densities import log_at_mean, log_gaussian
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, ModelError, floored
 
 Mask = NDArray[np.bool_]
@@ -50,17 +51,13 @@ class _Gaussians:
     """Shape (M,)."""
 
     def log_likelihood(self, observations: NDArray[Any]) -> Array:
-        models, states, dimensions = self.means.shape
-        total = np.empty((models, states, observations.shape[2]))
-        total[...] = -0.5 * np.log(2.0 * np.pi * self.variances).sum(axis=2)[:, :, None]
-        half_precisions = 0.5 / self.variances
-        # A dimension at a time: arrays of this size stay in the cache, one of F times it does not.
-        for f in range(dimensions):
-            term = observations[:, f, None] - self.means[:, :, f, None]
-            term *= term
-            term *= half_precisions[:, :, f, None]
-            total -= term
-        return total
+        at_mean = log_at_mean(self.variances)[:, :, None]
+        return log_gaussian(
+            np.broadcast_to(at_mean, (*at_mean.shape[:2], observations.shape[2])),
+            np.moveaxis(self.means, 2, 0)[..., None],
+            np.moveaxis(0.5 / self.variances, 2, 0)[..., None],
+            observations.swapaxes(0, 1)[:, :, None],
+        )
 
     def reestimated(self, observations: NDArray[Any], states: Array, numbers: Integers) -> Self:
         weight = states.sum(axis=2)[:, :, None]

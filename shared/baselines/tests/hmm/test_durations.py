@@ -11,8 +11,8 @@ from hmcs.recognition.hmm.inference import (
     ImpossibleSequenceError,
     forward,
     log_likelihood,
+    shortest_path,
     smooth,
-    viterbi,
 )
 from hmcs_baselines.hmm.durations import (
     DurationError,
@@ -116,10 +116,10 @@ def test_the_direct_recursions_equal_the_expanded_hmm(seed, states, longest):
     )
     gamma = smooth(flat.initial, flat.transition, flat_emission).states @ of_state
     np.testing.assert_allclose(smoothed(model, emission), gamma, atol=1e-10)
-    path, log_best = viterbi(flat.initial, flat.transition, flat_emission)
+    best = shortest_path(flat.initial, flat.transition, flat_emission)
     found = decoded(model, emission)
-    assert found.log_probability == pytest.approx(log_best)
-    np.testing.assert_array_equal(found.states, flat.state[path])
+    assert found.log_probability == pytest.approx(-best.cost)
+    np.testing.assert_array_equal(found.states, flat.state[best.path])
 
 
 def test_geometric_durations_are_the_ordinary_hmm_of_mean_dwell_times():

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmcs.recognition.hmm.emissions import Discrete, Gaussian, ModelError, ObservationError
-from hmcs.recognition.hmm.inference import ImpossibleSequenceError, forward, forward_scaled
+from hmcs.recognition.hmm.inference import ImpossibleSequenceError, forward, log_filtered
 from hmcs.recognition.hmm.learning import CHAIN, baum_welch
+from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.hmm.model import Hmm, evaluate
 from hmcs_baselines.hmm.layered import Layer, LayeredFilter, LayerError, run
 from hmcs_baselines.hmm.markov import MarkovModelError
@@ -40,15 +41,21 @@ def posterior(prior, models, observations):
     return weights / weights.sum()
 
 
+def filtered(model, observations):
+    """P(state | observations so far) of one model alone, shape (T, N)."""
+    log_emission = model.emission.log_likelihood(observations)
+    return np.exp(
+        log_filtered(model.initial, LogTransitions(model.transition), log_emission).log_states
+    )
+
+
 @given(seed=st.integers(0, 10_000), states=st.integers(1, 4))
 @settings(max_examples=15)
 def test_one_layer_of_one_model_is_the_forward_filter(seed, states):
     rng = np.random.default_rng(seed)
     model, observations = gaussian(rng, states), rng.normal(size=(20, 2))
     beliefs = run([Layer((model,))], observations)
-    expected = forward_scaled(
-        model.initial, model.transition, model.emission.log_likelihood(observations)
-    ).states
+    expected = filtered(model, observations)
     np.testing.assert_allclose(
         [belief.classification for (belief,) in beliefs], expected, atol=1e-12
     )
@@ -99,9 +106,7 @@ def test_winner_takes_all_equals_feeding_the_winning_symbols_by_hand():
     task = discrete(rng, 3, 4)
     layers = [Layer(tuple(only(k, 4) for k in range(4)), window=1), Layer((task,))]
     symbols = rng.integers(4, size=30)
-    by_hand = forward_scaled(
-        task.initial, task.transition, task.emission.log_likelihood(symbols)
-    ).states
+    by_hand = filtered(task, symbols)
     tops = [beliefs[1].classification for beliefs in run(layers, symbols)]
     np.testing.assert_allclose(tops, by_hand, atol=1e-12)
 
@@ -189,9 +194,7 @@ def test_a_restarted_layer_is_as_new_and_the_others_go_on():
 
     task = layers[1].models[0]
     winners = [int(b[0].output.argmax()) for b in restarted if b[0].output is not None]
-    by_hand = forward_scaled(
-        task.initial, task.transition, task.emission.log_likelihood(np.array(winners))
-    ).states
+    by_hand = filtered(task, np.array(winners))
     np.testing.assert_allclose(restarted[-1][1].classification, by_hand[-1], atol=1e-12)
 
 

@@ -5,7 +5,7 @@ Shapes: N states, T observations, F dimensions, K mixture components.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -142,9 +142,33 @@ class Mixture:
 
 def log_gaussians(means: Array, variances: Array, observations: Array) -> Array:
     """Return log N(observation; mean, diag variance), shape (T, N)."""
-    difference = observations[:, None, :] - means[None, :, :]
-    terms = difference**2 / variances + np.log(2.0 * np.pi * variances)
-    return np.asarray(-0.5 * terms.sum(axis=2))
+    at_mean = np.broadcast_to(log_at_mean(variances), (len(observations), len(means)))
+    return log_gaussian(at_mean, means.T, 0.5 / variances.T, observations.T[:, :, None])
+
+
+def log_at_mean(variances: Array) -> Array:
+    """Return the log density of diagonal Gaussians at their means, shape (…) of (…, F)."""
+    return np.asarray(-0.5 * np.log(2.0 * np.pi * variances).sum(axis=-1))
+
+
+def log_gaussian(
+    at_mean: Array,
+    means: Iterable[Array],
+    half_precisions: Iterable[Array],
+    values: Iterable[Array],
+) -> Array:
+    """Return at_mean − Σ_f (value − mean)² / 2σ², of the shape of `at_mean`, the log at the means.
+
+    Means, 1 / 2σ² and values come a dimension at a time, each of a shape that broadcasts to that:
+    arrays of one dimension stay in the cache, where an array of all of them does not.
+    """
+    total = at_mean.copy()
+    for mean, half_precision, value in zip(means, half_precisions, values, strict=True):
+        term = value - mean
+        term *= term
+        term *= half_precision
+        total -= term
+    return total
 
 
 def check_spread(sequences: Sequence[Observations], variance_floor: float) -> None:

@@ -6,6 +6,8 @@ them instead of O(N²). Shapes: N states, T observations.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from hmcs.arrays import Array
@@ -27,6 +29,18 @@ def log_sum(values: Array, axis: int) -> Array:
     with np.errstate(divide="ignore"):
         total = np.log(np.exp(values - safe).sum(axis=axis, keepdims=True)) + safe
     return np.asarray(total.squeeze(axis=axis))
+
+
+class Ways(Protocol):
+    """Products with a transition matrix A, shape (N, N), of logarithms."""
+
+    def ahead(self, log_here: Array) -> Array:
+        """Return log Σ_i exp(log_here_i) A_ij, shape (N,)."""
+        ...
+
+    def back(self, log_next: Array) -> Array:
+        """Return log Σ_j A_ij exp(log_next_j), shape (N,)."""
+        ...
 
 
 class LogTransitions:

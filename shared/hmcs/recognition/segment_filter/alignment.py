@@ -114,7 +114,7 @@ def log_densities(
     """Return the log density of what each pair observed in each phase, shape (p, N).
 
     `where` is each pair's displacement from its origin, m, (p, D); `direction` that of the step,
-    (D,).
+    (D,). Not by `log_gaussian`: every pair has variances of its own, multiplied on the way.
     """
     axes = where.shape[1]
     means = [table.take(gesteme, axis=0) for table in phases.means]

@@ -44,7 +44,10 @@ class FilterSettings(NamedTuple):
 
 
 class SegmentFilter:
-    """Moves the belief over (state, segment start) from step to step."""
+    """Moves the belief over (state, segment start) from step to step.
+
+    A forward recursion whose states come and go with the evidence: none over a fixed set serves.
+    """
 
     def __init__(self, chain: TaskChain, settings: FilterSettings) -> None:
         self._chain = chain

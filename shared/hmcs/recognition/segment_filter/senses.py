@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hmcs.arrays import Array
+from hmcs.recognition.hmm.densities import log_gaussian
 from hmcs.recognition.segments import LearningError, Segment
 from hmcs.recognition.sensors import Sensors, dimensions, sensor_rows, sensors_of
 
@@ -95,6 +96,11 @@ def log_densities(senses: Senses, values: Array) -> Array:
     silence speaks neither for nor against the task.
     """
     silent = np.isnan(values)
-    squares = (np.where(silent, 0.0, values) - senses.means) ** 2 / senses.variances
-    terms = np.where(silent, 1.0, squares) + np.log(2.0 * np.pi * senses.variances)
-    return np.asarray((-0.5 * senses.weights * terms).sum(axis=2))
+    half_precisions = np.where(silent, 0.0, 0.5 * senses.weights / senses.variances)
+    at_mean = np.log(2.0 * np.pi * senses.variances) + silent
+    return log_gaussian(
+        np.asarray((-0.5 * senses.weights * at_mean).sum(axis=2)),
+        np.moveaxis(senses.means, 2, 0),
+        np.moveaxis(half_precisions, 2, 0),
+        np.where(silent, 0.0, values),
+    )
