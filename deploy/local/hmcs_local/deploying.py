@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from hmcs.bus.keys import Member, recognizer_in
 from hmcs.bus.messages import Ask, Belief
@@ -22,6 +21,13 @@ from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import DESCRIBE
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
+from hmcs.recognizer_takeover import (
+    NOTHING_COMPARED,
+    Agreement,
+    SameNameError,
+    Shadows,
+    check_names_differ,
+)
 from hmcs.shown import plain
 from hmcs_local import swap
 from hmcs_local.control import Control
@@ -31,20 +37,6 @@ from hmcs_local.observer import speakers
 READY_WITHIN_S = 15.0
 SERVICE = "recognizer"
 _LOOK_EVERY_S = 0.05
-
-
-class Agreement(NamedTuple):
-    """A shadow beside the active recognizer."""
-
-    steps: int
-    """Both said something of."""
-    alike: int
-    """With the same likely state."""
-
-    def __str__(self) -> str:
-        if not self.steps:
-            return "the hand did not move: nothing could be compared"
-        return f"the same likely state in {self.alike} of {self.steps} steps"
 
 
 def deploy(
@@ -66,17 +58,17 @@ def deploy(
     model = load_model(file)
     with _alone(control, folder):
         active = active_model(bus)
-        if model.name == active:
-            raise DeployError(
-                f"{file}: is called {model.name!r}, as the active model is: train it under another "
-                "name, with --name, so that both can run side by side"
-            )
+        try:
+            check_names_differ(model.name, active)
+        except SameNameError as error:
+            raise DeployError(f"{file}: {error}, with `hmcs train --name`") from None
         history = _settled(read_history(folder), active, control, tell)
         now = _active(history, active)
         kept = [*history.deployed[:-1], now] if history.deployed else [now] if active else []
         with _shadow(bus, control, folder, history, model, file, tell) as newcomer:
             agreement = watched(bus, active, model.name, watch_s)
-            tell(f"beside {active}: {agreement}" if active else str(agreement))
+            still = "" if agreement.compared else "the hand did not move: "
+            tell(f"beside {active}: {still}{agreement}" if active else f"{still}{agreement}")
             _take_over(bus, folder, History(deployed=(*kept, newcomer)), tell)
         _let_go(control, now, tell)
     return agreement
@@ -138,21 +130,19 @@ def _followed(bus: Bus) -> dict[str, str]:
 
 def watched(bus: Bus, active: str, newcomer: str, watch_s: float) -> Agreement:
     """Return how two recognizers agreed while they ran side by side for so long."""
-    said: dict[str, dict[tuple[str, int], str]] = {active: {}, newcomer: {}}
+    shadows = Shadows(steps=None)
 
     def hear(received: Received[Belief]) -> None:
         belief = received.body
         name = recognizer_in(received.key).model
-        if name in said:
-            said[name][belief.clock, belief.step] = belief.likely_state
+        if name in (active, newcomer):
+            shadows.heard(name, belief.clock, belief.step, belief.likely_state)
 
     bus.subscribe(Belief, bus.keys.belief(), hear)
     until_s = time.monotonic() + watch_s
     while time.monotonic() < until_s:
         bus.pump(_LOOK_EVERY_S)
-    both = said[active].keys() & said[newcomer].keys()
-    alike = sum(said[active][step] == said[newcomer][step] for step in both)
-    return Agreement(len(both), alike)
+    return shadows.agreement(active).get(newcomer, NOTHING_COMPARED)
 
 
 def _active(history: History, active: str) -> Deployed:

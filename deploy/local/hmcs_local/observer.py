@@ -9,12 +9,9 @@ from hmcs.bus.keys import ANY, Keys, Member
 from hmcs.bus.messages import Ask, Envelope, Health
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import DESCRIBE, HEALTH
+from hmcs.recognizer_takeover import publishes_beliefs
 
 _ANSWER_TIMEOUT_S = 0.5
-
-
-CLASSIFIER = "gesteme_classifier"
-"""Works for a model and believes in nothing: without a task HMM nobody speaks for the model."""
 
 
 class Sighting(NamedTuple):
@@ -76,7 +73,7 @@ def speakers(bus: Bus) -> dict[str, tuple[Member, ...]]:
 def _speakers(keys: Keys, tokens: Iterable[str]) -> dict[str, tuple[Member, ...]]:
     found: dict[str, list[Member]] = {}
     for token in tokens:
-        if (member := keys.member_of(token)).service != CLASSIFIER:
+        if publishes_beliefs(member := keys.member_of(token)):
             found.setdefault(keys.model_of(token), []).append(member)
     return {model: tuple(sorted(members)) for model, members in sorted(found.items())}
 

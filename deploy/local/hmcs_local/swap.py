@@ -5,20 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
 
 from hmcs.bus.keys import ANY, KeyNameError, check_name
-from hmcs.bus.messages import ActivateRecognizer, Done, LoadModel, Message
 from hmcs.bus.session import Bus
-from hmcs.bus.verbs import ACTIVATE, LOAD_MODEL, Verb
 from hmcs.errors import UserError
+from hmcs.recognizer_takeover import Question, load_into_fixture
+from hmcs.recognizer_takeover import activate as activation
 from hmcs_local.asking import NobodyAnswersError, PartlyAnsweredError, asked_of
 from hmcs_local.control import Control, ControlError
 from hmcs_local.interrupts import uninterrupted
-from hmcs_local.observer import CLASSIFIER, speakers
+from hmcs_local.observer import speakers
 
-Q = TypeVar("Q", bound=Message)
-
+CLASSIFIER = "gesteme_classifier"
 _LOOK_EVERY_S = 0.05
 
 
@@ -46,7 +44,7 @@ def activate(bus: Bus, model: str) -> str:
             f"nobody runs a recognizer of {model!r} in cell {bus.settings.cell}, so it would "
             f"assist nobody: start it first. Those that are run: {', '.join(running) or 'none'}"
         )
-    return _asked_of_fixtures(bus, ACTIVATE, ActivateRecognizer(model=model))
+    return _asked(bus, activation(model))
 
 
 def load(bus: Bus, path: str) -> str:
@@ -54,12 +52,12 @@ def load(bus: Bus, path: str) -> str:
 
     The path is the fixture controller's own. Raises SwapError as `activate` does.
     """
-    return _asked_of_fixtures(bus, LOAD_MODEL, LoadModel(path=path))
+    return _asked(bus, load_into_fixture(path))
 
 
-def _asked_of_fixtures(bus: Bus, verb: Verb[Q, Done], question: Q) -> str:
+def _asked(bus: Bus, question: Question) -> str:
     try:
-        return asked_of(bus, verb, question, "fixture_controller")
+        return asked_of(bus, question.verb, question.body, question.service)
     except PartlyAnsweredError as error:
         raise PartlySwappedError(str(error)) from None
     except NobodyAnswersError as error:

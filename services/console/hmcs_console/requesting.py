@@ -8,9 +8,9 @@ from functools import partial
 
 from hmcs.bus.messages import ActivateRecognizer
 from hmcs.bus.session import Bus
+from hmcs.recognizer_takeover import Question
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.seeing.seen import Seen
-from hmcs_console.teaching.requests import Question
 
 RUN_WITHIN_S = 2.0
 """A recognizer that is to be activated has so long to be run by some process."""

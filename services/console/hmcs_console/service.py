@@ -24,6 +24,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Answer, Bus, Received
 from hmcs.bus.verbs import HEALTH, LOOKS
 from hmcs.fixtures.controller.rules import rules_of
+from hmcs.recognizer_takeover import Question
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.operating.handles import Stopped
@@ -44,7 +45,6 @@ from hmcs_console.serving.painter import Painter
 from hmcs_console.settings import ConsoleSettings
 from hmcs_console.teaching import requests
 from hmcs_console.teaching.recordings import Recordings
-from hmcs_console.teaching.requests import Question
 from hmcs_console.teaching.swapping import Swapping
 from hmcs_console.view import View
 

@@ -1,4 +1,4 @@
-"""Pace, colors, trails, history, shadows, geometry, and requests."""
+"""Pace, colors, trails, history, geometry, and requests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from hmcs.bus.messages import Label, Record, Step, Train
 from hmcs_console.seeing.history import LONGEST_ROWS, columns, limits, written
-from hmcs_console.seeing.shadows import Agreement, Shadows
 from hmcs_console.seeing.trails import Trail
 from hmcs_console.serving.pace import next_rate_hz
 from hmcs_console.shapes.geometry import box_edges, capsule, line, tube, turn_to, wxyz
@@ -129,34 +128,6 @@ def test_a_plot_has_round_limits_with_every_number_between_them(
     numbers: list[float], expected: tuple[float, float]
 ) -> None:
     assert limits([np.array(numbers)]) == pytest.approx(expected)
-
-
-# --- shadows --------------------------------------------------------------------------------------
-
-
-def test_a_shadow_agrees_in_the_steps_both_saw() -> None:
-    shadows = Shadows()
-    for step, state in enumerate(("x", "x", "y", "y")):
-        shadows.heard("active", "clock", step, state)
-    for step, state in ((1, "x"), (2, "x"), (3, "y"), (9, "y")):
-        shadows.heard("shadow", "clock", step, state)
-    shadows.heard("shadow", "another clock", 0, "z")
-    assert shadows.agreement("active") == {"shadow": Agreement(same=2, compared=3)}
-    assert shadows.recognizers == ("active", "shadow")
-
-
-def test_nobody_agrees_with_a_recognizer_that_said_nothing() -> None:
-    shadows = Shadows()
-    shadows.heard("shadow", "clock", 0, "x")
-    assert shadows.agreement("") == {}
-
-
-def test_only_the_newest_steps_are_compared() -> None:
-    shadows = Shadows(steps=2)
-    for step in range(5):
-        shadows.heard("active", "c", step, "x")
-        shadows.heard("shadow", "c", step, "x" if step > 2 else "y")
-    assert shadows.agreement("active")["shadow"] == Agreement(2, 2)
 
 
 # --- geometry -------------------------------------------------------------------------------------

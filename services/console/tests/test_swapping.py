@@ -19,6 +19,7 @@ from hmcs.bus.messages import (
     TrainingProgress,
 )
 from hmcs.bus.session import RequestRefusedError
+from hmcs.recognizer_takeover import activate
 from hmcs_console.teaching import requests
 
 MakeCell = Callable[..., Any]
@@ -180,10 +181,10 @@ def test_a_recognizer_that_no_process_runs_is_not_activated(
     others.train()
     others.tokens["mine"].withdraw()
     cell.until(lambda: not cell.service._seen.runners.run("mine", set()), "the withdrawal")
-    cell.service.ask(requests.activate("mine"))
+    cell.service.ask(activate("mine"))
     others.go_on(lambda: "no process that is there runs it" in cell.service.answer, "the reason")
     assert cell.service.answer.startswith("mine is not activated")
-    cell.service.ask(requests.activate("made-up"))
+    cell.service.ask(activate("made-up"))
     others.go_on(lambda: "made-up is not activated" in cell.service.answer, "the reason")
     assert others.asked == []
     assert others.active == "old"
@@ -197,7 +198,7 @@ def test_a_recognizer_is_activated_as_soon_as_a_process_runs_it(
     others.train()
     others.tokens["mine"].withdraw()
     cell.until(lambda: not cell.service._seen.runners.run("mine", set()), "the withdrawal")
-    cell.service.ask(requests.activate("mine"))
+    cell.service.ask(activate("mine"))
     cell.wait(0.2)
     assert others.asked == []
     cell.other.announce(cell.other.keys.member("mine", "task_hmm", "t"))

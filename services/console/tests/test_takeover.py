@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hmcs.bus.messages import ActivateRecognizer, LoadModel, TrainingProgress
-from hmcs_console.seeing.shadows import Agreement
+from hmcs.recognizer_takeover import Agreement
 from hmcs_console.teaching import takeover
 from hmcs_console.teaching.takeover import Advance, Followed, Takeover
 

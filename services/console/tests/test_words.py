@@ -7,9 +7,9 @@ import pytest
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
+from hmcs.recognizer_takeover import Agreement
 from hmcs_console.order import Order
 from hmcs_console.seeing.marking import Marking
-from hmcs_console.seeing.shadows import Agreement
 from hmcs_console.telling import words
 
 

@@ -6,9 +6,7 @@ from collections import defaultdict
 from collections.abc import Set
 
 from hmcs.bus.keys import Member
-
-_SILENT = ("gesteme_classifier",)
-"""Services that work for a model and publish no belief."""
+from hmcs.recognizer_takeover import publishes_beliefs
 
 
 class Runners:
@@ -42,5 +40,5 @@ class Runners:
         A process that announced no token for its model counts while it is `present`, if it was the
         last to publish.
         """
-        works = any(member.service not in _SILENT for member in self._members.get(model, ()))
+        works = any(publishes_beliefs(member) for member in self._members.get(model, ()))
         return works or self._spoke.get(model) in present

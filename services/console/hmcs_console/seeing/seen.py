@@ -18,12 +18,12 @@ from hmcs.bus.messages import (
     Step,
     TrainingProgress,
 )
+from hmcs.recognizer_takeover import Agreement, Shadows
 from hmcs_console.seeing.gathered import Gathered, beneath, gathered
 from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.runners import Runners
-from hmcs_console.seeing.shadows import Agreement, Shadows
 from hmcs_console.seeing.takes import Take
 from hmcs_console.seeing.trails import Points, Trail
 from hmcs_console.shapes.palette import UNKNOWN, Color, color_of

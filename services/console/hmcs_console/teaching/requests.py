@@ -3,43 +3,21 @@
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
 
 from hmcs.bus.keys import KeyNameError, check_name
-from hmcs.bus.messages import (
-    ActivateRecognizer,
-    Ask,
-    Done,
-    Label,
-    Message,
-    Record,
-    Step,
-    Train,
-)
-from hmcs.bus.verbs import ACTIVATE, CANCEL, RECORD, TRAIN, Verb
+from hmcs.bus.messages import Ask, Label, Record, Step, Train
+from hmcs.bus.verbs import CANCEL, RECORD, TRAIN
 from hmcs.errors import UserError
+from hmcs.recognizer_takeover import Question
 
 
 class RequestError(UserError):
     """A request that nobody could carry out; says what is wrong with it."""
 
 
-class Question(NamedTuple):
-    """A request that a process carries out."""
-
-    service: str
-    verb: Verb[Any, Done]
-    body: Message
-
-
 def record(on: bool, name: str) -> Question:
     """Return the request to begin or to end a recording."""
     return Question("recorder", RECORD, Record(on=on, name=name.strip()))
-
-
-def activate(recognizer: str) -> Question:
-    """Return the request that the fixture follows a recognizer."""
-    return Question("fixture_controller", ACTIVATE, ActivateRecognizer(model=recognizer))
 
 
 def train(

@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from hmcs.recognizer_takeover import NOTHING_COMPARED, Question, activate
 from hmcs_console.asking import first_of
 from hmcs_console.seeing.seen import Seen
-from hmcs_console.seeing.shadows import Agreement
-from hmcs_console.teaching import requests, takeover
-from hmcs_console.teaching.requests import Question
+from hmcs_console.teaching import takeover
 from hmcs_console.teaching.takeover import Advance, Followed, Takeover
 
 Told = Callable[[str], None]
@@ -46,7 +45,7 @@ class Swapping:
         if now is not None and now.under_way:
             self._advance(takeover.called_off(now))
         elif self._followed.before:
-            question = requests.activate(self._followed.before)
+            question = activate(self._followed.before)
             self._request(question, self._tell, self._tell)
         else:
             self._tell("no other recognizer was active before")
@@ -57,7 +56,7 @@ class Swapping:
         active = self._seen.active(now_s)
         self._followed = takeover.followed(self._followed, active)
         if self._takeover is not None and self._takeover.under_way:
-            agreed = self._seen.agreement(active).get(self._takeover.model, Agreement(0, 0))
+            agreed = self._seen.agreement(active).get(self._takeover.model, NOTHING_COMPARED)
             there = first_of("recognizer", members) is not None
             self._advance(takeover.at(self._takeover, now_s, agreed, there=there))
         self._seen.takeover = takeover.said(self._takeover, now_s)

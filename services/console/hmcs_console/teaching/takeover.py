@@ -9,11 +9,18 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple
 
-from hmcs.bus.messages import LoadModel, TrainingProgress
-from hmcs.bus.verbs import LOAD_MODEL
+from hmcs.bus.messages import TrainingProgress
+from hmcs.recognizer_takeover import (
+    NOTHING_COMPARED,
+    Agreement,
+    Question,
+    SameNameError,
+    activate,
+    check_names_differ,
+    load_into_fixture,
+    load_into_recognizer,
+)
 from hmcs.shown import Markdown
-from hmcs_console.seeing.shadows import Agreement
-from hmcs_console.teaching.requests import Question, activate
 
 Stage = Literal["loading", "comparing", "activating", "done", "failed"]
 _LINES = Markdown("  \n")
@@ -35,7 +42,7 @@ class Takeover(NamedTuple):
     """Nothing is to be compared."""
     until_s: float = math.inf
     """It is compared until then, by the local monotonic clock."""
-    agreed: Agreement = Agreement(0, 0)
+    agreed: Agreement = NOTHING_COMPARED
     """With who is active, so far."""
     detail: str = ""
     """What came of it in the end."""
@@ -68,16 +75,11 @@ def begun(trained: TrainingProgress | None, active: str) -> Advance:
         name = "what was trained" if trained is None else trained.model
         return _failed(Takeover(name, active, "failed"), "nothing was trained yet: train first")
     takeover = Takeover(trained.model, active, "loading")
-    if trained.model == active:
-        return _failed(
-            takeover, "it bears the name of the active one: train it under another to have both"
-        )
-    load = LoadModel(path=trained.path)
-    # The fixture first: a belief of a model that is not loaded there is refused.
-    to_ask = (
-        Question("fixture_controller", LOAD_MODEL, load),
-        Question("recognizer", LOAD_MODEL, load),
-    )
+    try:
+        check_names_differ(trained.model, active)
+    except SameNameError as error:
+        return _failed(takeover, str(error))
+    to_ask = (load_into_fixture(trained.path), load_into_recognizer(trained.path))
     return Advance(takeover._replace(to_ask=to_ask), to_ask[0])
 
 
@@ -156,12 +158,9 @@ def said(takeover: Takeover | None, now_s: float) -> Markdown:
 
 
 def _agreed(takeover: Takeover) -> str:
-    same, compared = takeover.agreed
-    if compared:
-        return f"the same likely state in {same / compared:.0%} of {compared} steps"
-    if takeover.stage == "comparing":
+    if takeover.stage == "comparing" and not takeover.agreed.compared:
         return "the hand does not move: nothing is compared"
-    return "nothing was compared"
+    return str(takeover.agreed)
 
 
 def _activated(takeover: Takeover) -> Advance:

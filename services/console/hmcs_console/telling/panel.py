@@ -6,13 +6,13 @@ from typing import Any, Protocol
 
 import viser
 
+from hmcs.recognizer_takeover import Question, activate
 from hmcs.shown import plain
 from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.buttons import on_change, on_click
 from hmcs_console.serving.inbox import pressed_by
 from hmcs_console.serving.writing import Choice, add_words, write
 from hmcs_console.teaching import requests
-from hmcs_console.teaching.requests import Question
 from hmcs_console.teaching.timeline import Editing, Timeline
 from hmcs_console.telling import words
 from hmcs_console.telling.plots import Plots
@@ -180,7 +180,7 @@ class Panel:
 
     def _activate(self) -> None:
         if self._choice.chosen:
-            self._requests.ask(requests.activate(self._choice.chosen))
+            self._requests.ask(activate(self._choice.chosen))
 
     def _use_for_training(self, path: str) -> None:
         if plain(path, _LONGEST_PATH) != path:

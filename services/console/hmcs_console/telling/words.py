@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
+from hmcs.recognizer_takeover import Agreement
 from hmcs.shown import Markdown
 from hmcs_console.seeing.marking import Marking
-from hmcs_console.seeing.shadows import Agreement
 
 MOST_NAMES = 12
 """Of a list of names so many are written out."""
