@@ -7,21 +7,13 @@ counts, however late a busy process comes to handle it. Steps are released in or
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from hmcs.recognition.recognizer import StepEvidence
 
 Verdict = Literal["taken", "duplicate", "late"]
-
-
-class Released(NamedTuple):
-    """The evidence of one step, as much of it as came in time."""
-
-    evidence: StepEvidence
-    overdue: bool
-    """True where the deadline passed before every gesteme was covered."""
 
 
 class Gathering:
@@ -72,7 +64,7 @@ class Gathering:
         """Note that whatever arrived before `now_ns` has been handled."""
         self._handled_until_ns = max(self._handled_until_ns, now_ns)
 
-    def release(self, now_ns: int) -> Released | None:
+    def release(self, now_ns: int) -> StepEvidence | None:
         """Return the next step at `now_ns` if its evidence is complete or its deadline has passed.
 
         The deadline has passed once everything has been handled that arrived before it; that the
@@ -89,7 +81,7 @@ class Gathering:
         self._due_ns.pop(step)
         if complete:
             self._note_early(step, due_ns, now_ns)
-        return Released(_joined(step, self._parts.pop(step, [])), not complete)
+        return _joined(step, self._parts.pop(step, []))
 
     def _note_early(self, step: int, due_ns: int, now_ns: int) -> None:
         for past in [s for s, until_ns in self._early_until_ns.items() if until_ns < now_ns]:

@@ -109,13 +109,13 @@ class TaskHmm(Service):
         self._release()
 
     def _release(self) -> None:
-        while (released := self._gathering.release(time.monotonic_ns())) is not None:
-            recognition = self._recognizer.step(released.evidence)
+        while (evidence := self._gathering.release(time.monotonic_ns())) is not None:
+            recognition = self._recognizer.step(evidence)
             if recognition.belief.missing:
                 self._degraded += 1
                 names = self._named(recognition.belief.missing)
                 self._limited.warning("degraded", "no evidence in time", gestemes=", ".join(names))
-            step = released.evidence.step
+            step = evidence.step
             message = belief_message(self._model, recognition, self._clock)
             self._belief.put(message, self._origins.pop(step, None))
         self._set_timer()

@@ -37,8 +37,7 @@ def test_a_step_is_released_as_soon_as_every_gesteme_is_covered():
     assert g.add(evidence(0, {2}), 0) == "taken"
     released = g.release(now_ns=2)
     assert released is not None
-    assert released.evidence.gestemes == (0, 1, 2)
-    assert not released.overdue
+    assert released.gestemes == (0, 1, 2)
     assert g.release(now_ns=3) is None
 
 
@@ -52,8 +51,7 @@ def test_past_the_deadline_a_step_is_released_with_what_came():
     g.caught_up(120)
     released = g.release(now_ns=500)
     assert released is not None
-    assert released.overdue
-    assert released.evidence.gestemes == (1,)
+    assert released.gestemes == (1,)
 
 
 def test_with_no_classifier_at_all_a_step_is_released_empty():
@@ -62,8 +60,8 @@ def test_with_no_classifier_at_all_a_step_is_released_empty():
     g.caught_up(DEADLINE_NS)
     released = g.release(now_ns=DEADLINE_NS)
     assert released is not None
-    assert released.evidence.gestemes == ()
-    assert len(released.evidence.pair_start) == 0
+    assert released.gestemes == ()
+    assert len(released.pair_start) == 0
 
 
 def test_the_first_evidence_for_a_gesteme_wins():
@@ -74,7 +72,7 @@ def test_the_first_evidence_for_a_gesteme_wins():
     assert g.add(evidence(0, {1, 2}, ratio=3.0), 0) == "taken"
     released = g.release(now_ns=1)
     assert released is not None
-    by_gesteme = dict(zip(released.evidence.pair_gesteme, released.evidence.log_ratio, strict=True))
+    by_gesteme = dict(zip(released.pair_gesteme, released.log_ratio, strict=True))
     assert by_gesteme == {0: 1.0, 1: 1.0, 2: 3.0}
 
 
@@ -120,8 +118,8 @@ def test_evidence_that_arrived_in_time_counts_however_late_it_is_handled(delays,
             assert g.add(evidence(t, {0, 1, 2}), at) == "taken"
         while (item := g.release(mail[-1][0] + behind)) is not None:
             released.append(item)
-    assert [item.evidence.step for item in released] == list(range(len(delays)))
-    assert not any(item.overdue for item in released)
+    assert [item.step for item in released] == list(range(len(delays)))
+    assert all(item.gestemes == (0, 1, 2) for item in released)
 
 
 def test_the_second_of_two_classifiers_is_no_late_one_unless_the_deadline_has_passed():
@@ -145,7 +143,7 @@ def test_after_a_restart_only_later_steps_count():
     g.add(evidence(40, {0, 1, 2}), 0)
     released = g.release(now_ns=0)
     assert released is not None
-    assert released.evidence.step == 40
+    assert released.step == 40
 
 
 @given(st.data())
@@ -172,11 +170,10 @@ def test_every_step_is_released_once_and_in_order_whatever_comes_when(data):
     g.caught_up(now_ns + DEADLINE_NS)
     while (item := g.release(now_ns + DEADLINE_NS)) is not None:
         released.append(item)
-    assert [item.evidence.step for item in released] == list(range(steps))
+    assert [item.step for item in released] == list(range(steps))
     for item in released:
-        held = item.evidence.gestemes
+        held = item.gestemes
         assert len(set(held)) == len(held)
-        assert item.overdue == (set(held) != {0, 1, 2})
 
 
 @pytest.mark.parametrize("now_ns", [0, 5])

@@ -181,13 +181,13 @@ class NetworkLevel:
         network = np.zeros((models, states, models, states))
         network[each, :, each] = chains.transition
         network[each, chains.states - 1, :, 0] += 1.0 / models
-        network = network.reshape(models * states, models * states)
+        joined = network.reshape(models * states, models * states)
         # (2.34) at its scale.
         first = np.zeros((models, states))
         first[:, 0] = 1.0 / models
-        predicted = first.ravel() @ network
-        self._filter = ForwardBank(predicted[None], network[None])
-        self._leaving = network.sum(axis=1)
+        predicted = first.ravel() @ joined
+        self._filter = ForwardBank(predicted[None], joined[None])
+        self._leaving = joined.sum(axis=1)
         self._predicted = float(predicted.sum())
 
     def step(self, index: int, log_emission: Array, *, mark: bool) -> Classification:

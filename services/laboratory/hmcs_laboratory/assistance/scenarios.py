@@ -14,11 +14,11 @@ import numpy as np
 
 from hmcs.arrays import Array
 from hmcs.motion.demonstrations import read_csv
-from hmcs.motion.detours import Detour, around
 from hmcs.motion.lasa import drawings, read_drawing
 from hmcs.motion.operators import joined
 from hmcs.motion.paths import Path, resample
 from hmcs.task import Obstacle, Task, Workspace, find_task, load_task
+from hmcs_laboratory.assistance.detours import Detour, around
 
 _SAMPLE_M = 0.002
 LENGTHS = (0.7, 1.3)

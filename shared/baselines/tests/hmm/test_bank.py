@@ -9,7 +9,6 @@ from hmcs.recognition.hmm.emissions import Gaussian, ModelError, ObservationErro
 from hmcs.recognition.hmm.topologies import (
     fully_connected,
     left_right,
-    left_right_with_back_steps,
     start_in,
 )
 from hmcs_baselines.hmm.bank import LOST, ForwardBank, GaussianScores
@@ -18,7 +17,7 @@ TOPOLOGIES = {
     "full": lambda n: fully_connected(n),
     "left-right": lambda n: left_right(n, 0.3, skip=0.2),
     "leaving": lambda n: left_right(n, 0.3, leaves=True),
-    "back steps": lambda n: left_right_with_back_steps(n, 0.3, 0.2),
+    "back steps": lambda n: left_right(n, 0.3)[::-1, ::-1],
 }
 
 

@@ -51,25 +51,6 @@ def left_right(states: int, epsilon: float, *, skip: float = 0.0, leaves: bool =
     return transition
 
 
-def left_right_with_back_steps(states: int, epsilon: float, back: float) -> Array:
-    """Return a left-right chain that also steps back: 1 − ε − back stays, ε goes on.
-
-    The first state has nowhere to step back to and the last nowhere to go on to: they stay instead.
-    Raises TopologyError unless ε and back are above 0 and together below 1.
-    """
-    _check_states(states)
-    _check_share("epsilon", epsilon)
-    _check_share("back", back)
-    if epsilon + back >= 1.0:
-        raise TopologyError(
-            f"epsilon {epsilon} and back {back} leave no probability to stay: "
-            "their sum must be below 1"
-        )
-    transition = np.diag(np.full(states - 1, epsilon), 1) + np.diag(np.full(states - 1, back), -1)
-    np.fill_diagonal(transition, 1.0 - transition.sum(axis=1))
-    return np.asarray(transition)
-
-
 def start_in(states: int, first: int = 0) -> Array:
     """Return the initial distribution that starts in one state with certainty.
 

@@ -100,7 +100,7 @@ def log_densities(senses: Senses, values: Array) -> Array:
     at_mean = np.log(2.0 * np.pi * senses.variances) + silent
     return log_gaussian(
         np.asarray((-0.5 * senses.weights * at_mean).sum(axis=2)),
-        np.moveaxis(senses.means, 2, 0),
-        np.moveaxis(half_precisions, 2, 0),
+        senses.means.transpose(2, 0, 1),
+        half_precisions.transpose(2, 0, 1),
         np.where(silent, 0.0, values),
     )

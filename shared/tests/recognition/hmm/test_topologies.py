@@ -10,7 +10,6 @@ from hmcs.recognition.hmm.topologies import (
     TopologyError,
     fully_connected,
     left_right,
-    left_right_with_back_steps,
     start_anywhere,
     start_in,
 )
@@ -24,7 +23,6 @@ def test_every_row_of_every_topology_sums_to_one(states, epsilon, other):
     for transition in (
         fully_connected(states, other),
         left_right(states, epsilon, skip=other),
-        left_right_with_back_steps(states, epsilon, other),
         start_in(states)[None],
         start_anywhere(states)[None],
     ):
@@ -54,13 +52,6 @@ def test_a_chain_that_is_left_lacks_epsilon_in_its_last_row():
     np.testing.assert_allclose(left_right(3, 0.2, leaves=True)[-1], [0.0, 0.0, 0.8])
 
 
-def test_back_steps_go_one_state_back():
-    np.testing.assert_allclose(
-        left_right_with_back_steps(3, 0.2, 0.1),
-        [[0.8, 0.2, 0.0], [0.1, 0.7, 0.2], [0.0, 0.1, 0.9]],
-    )
-
-
 @pytest.mark.parametrize(
     ("make", "says"),
     [
@@ -70,7 +61,6 @@ def test_back_steps_go_one_state_back():
         (lambda: left_right(3, 0.0), "epsilon is 0.0"),
         (lambda: left_right(3, 1.0), "epsilon is 1.0"),
         (lambda: left_right(3, 0.2, skip=-0.1), "skip is -0.1"),
-        (lambda: left_right_with_back_steps(3, 0.6, 0.4), "sum must be below 1"),
         (lambda: start_in(3, 3), "first state 3 is not one of 0 to 2"),
         (lambda: start_anywhere(-1), "at least one"),
     ],

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hmcs.motion.detours import around
 from hmcs.motion.paths import Path
+from hmcs_laboratory.assistance.detours import around
 
 LINE = Path(np.array([[0.0, 0, 0], [0.4, 0, 0]]))
 
