@@ -28,7 +28,7 @@ class Scene:
 
     def __init__(self) -> None:
         controller = Controller(Safeguards())
-        controller.load("m", Guides({"g": PATH}, Rules(compliance="belief")))
+        controller.load("m", Guides({"g": PATH}, Rules()))
         controller.activate("m")
         self.feed, self.now_s, self.seq, self.step = ControllerFeed(controller), 100.0, 0, 0
 
@@ -130,7 +130,7 @@ def test_one_forged_belief_keeps_no_later_one_out(step: int) -> None:
     scene.step += 1
     scene.guide(3)
     assert scene.believe(scene.step - 1) == "old"
-    assert scene.feed.controller._beliefs["m"].state == "s"
+    assert scene.feed.controller._recognizers.beliefs["m"].state == "s"
 
 
 @given(st.integers(0, 2**53))
@@ -168,7 +168,7 @@ def test_the_pose_is_that_of_one_robot() -> None:
     present = {"A", "B"}
     assert scene.feed.on_robot(1.0, source("A", "robot"), robot_at(0.1), present) == "taken"
     assert scene.feed.on_robot(1.0, source("B", "robot"), robot_at(0.9), present) == "second"
-    position = scene.feed.controller._robot.position(1.0)
+    position = scene.feed.controller._robot.pose(1.0).position
     assert position is not None
     assert position[0] == 0.1
 

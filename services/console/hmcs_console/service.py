@@ -288,4 +288,4 @@ def served(settings: ConsoleSettings) -> Served:
 def _cued(task: Task) -> bool:
     """Whether the pedal is a cue to the fixture in some state of a task."""
     rules = rules_of(task)
-    return any(rules.in_state(state.name).compliance == "cue" for state in task.states)
+    return any(rules.in_state(state.name).fixture.compliance == "cue" for state in task.states)

@@ -21,6 +21,9 @@ from hmcs.task.values import (
     different,
 )
 
+SPEED_LIMIT_M_S, ANGULAR_SPEED_LIMIT_RAD_S = 0.25, 0.5
+"""Of a robot whose task file names none."""
+
 
 def _check_measures(
     part: Part,
@@ -229,8 +232,8 @@ class RobotSetup(Part):
     """The tool is kept out of forbidden regions as a ball of this size about its tip."""
     tool: ToolSetup | None = None
     """What the tool fills of the room where it is no ball; instead of tool_radius_m."""
-    speed_limit_m_s: Positive = 0.25
-    angular_speed_limit_rad_s: Positive = 0.5
+    speed_limit_m_s: Positive = SPEED_LIMIT_M_S
+    angular_speed_limit_rad_s: Positive = ANGULAR_SPEED_LIMIT_RAD_S
 
     @model_validator(mode="after")
     def _has_one_tool(self) -> Self:

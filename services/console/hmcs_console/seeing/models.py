@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hmcs.errors import UserError
 from hmcs.fixtures.controller.rules import rules_of
+from hmcs.fixtures.guides.volumes import volume_radius_m
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, model_files
 from hmcs.shown import plain
@@ -68,13 +69,13 @@ def guide_of(model: Model, state: str, gesteme: str) -> Guide | None:
     """Return a guide of a model as large as the robot is led; None where it has no such gesteme."""
     if gesteme not in model.gesteme_names:
         return None
-    path, rules = model.paths[gesteme], rules_of(model.task).in_state(state)
-    points = rules.operator_scale * path.points
-    if rules.volume is None:
+    path, fixture = model.paths[gesteme], rules_of(model.task).in_state(state).fixture
+    points = fixture.operator_scale * path.points
+    if fixture.volume is None:
         return Guide(points, None)
     progress = path.arc_length / path.length_m
     radii = [
-        rules.operator_scale * rules.volume.radius_m(float(share), float(spread))
+        fixture.operator_scale * volume_radius_m(fixture.volume, float(share), float(spread))
         for share, spread in zip(progress, model.spreads[gesteme], strict=True)
     ]
     return Guide(points, tube(points, radii))

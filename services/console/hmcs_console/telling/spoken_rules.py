@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hmcs.fixtures.controller.rules import Rules, rules_of
-from hmcs.fixtures.guides.volumes import Volume
 from hmcs.shown import Markdown
 from hmcs.task import Task
+from hmcs.task.fixture_parts import VolumeSetup
 
 _HEAD = Markdown("| state | law, compliance | ξ | volume, radius | leads |\n|---|---|---|---|---|")
 
@@ -29,9 +29,9 @@ def rules(task: Task | None, state_now: str) -> Markdown:
 def _row(state: str, rules: Rules, now: bool) -> Markdown:
     cells = (
         state,
-        f"{rules.law}, {_compliance(rules)}",
-        f"{rules.maximum_factor:.2f}",
-        _volume(rules.volume),
+        f"{rules.fixture.law}, {_compliance(rules)}",
+        f"{rules.fixture.maximum_factor:.2f}",
+        _volume(rules.fixture.volume),
         _aim(rules),
     )
     cell = Markdown("**{}**" if now else "{}")
@@ -39,14 +39,15 @@ def _row(state: str, rules: Rules, now: bool) -> Markdown:
 
 
 def _compliance(rules: Rules) -> str:
-    if rules.compliance in ("fixed", "optimal"):
-        return f"{rules.compliance} {rules.fixed_compliance:.2f}"
-    if rules.compliance == "cue":
-        return f"cue: {rules.cue.cue}, {rules.cue.scaling}"
-    return rules.compliance
+    fixture = rules.fixture
+    if fixture.compliance in ("fixed", "optimal"):
+        return f"{fixture.compliance} {rules.fixed_compliance:.2f}"
+    if fixture.compliance == "cue":
+        return f"cue: {fixture.cue.cue}, {fixture.cue.scaling}"
+    return fixture.compliance
 
 
-def _volume(volume: Volume | None) -> str:
+def _volume(volume: VolumeSetup | None) -> str:
     if volume is None:
         return "none"
     knots = " → ".join(f"{knot.radius_m * 1e3:.0f}" for knot in volume.knots)

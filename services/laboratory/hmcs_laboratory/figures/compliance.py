@@ -8,11 +8,12 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from hmcs.arrays import Array
-from hmcs.fixtures.compliance.factor import Line, crossing, optimal_compliance
+from hmcs.fixtures.compliance.factor import crossing, optimal_compliance
 from hmcs.fixtures.law import Gains
 from hmcs.fixtures.parts import PreferredSubspace
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
 from hmcs.motion.paths import Path
+from hmcs.task.fixture_parts import FittedLine
 from hmcs_laboratory.data.hands import Count
 from hmcs_laboratory.figures.drawing import FAINT, INK, WRONG_COLOR, Drawn, color_of, new_picture
 from hmcs_laboratory.figures.fixture_fields import CURVE, MM, FieldSettings
@@ -94,7 +95,7 @@ def optimal_compliance_found(settings: ComplianceSettings, rng: np.random.Genera
                 results[0, t, c, k] = MM * np.sqrt((_off(robot, meant) ** 2).mean())
                 results[1, t, c, k] = _PERIOD_S * len(robot)
     picture = new_picture(4.2)
-    lines: list[tuple[Line, Line]] = []
+    lines: list[tuple[FittedLine, FittedLine]] = []
     for ax, what, values, unit in zip(
         picture.subplots(1, 2), ("error", "time"), results, ("mm", "s"), strict=True
     ):
@@ -102,7 +103,7 @@ def optimal_compliance_found(settings: ComplianceSettings, rng: np.random.Genera
         for t, name in enumerate(("following", "leaving")):
             mean = values[t].mean(axis=1)
             slope, intercept = np.polyfit(compliances, mean, 1)
-            fitted.append(Line(float(slope), float(intercept)))
+            fitted.append(FittedLine(slope=float(slope), intercept=float(intercept)))
             ax.plot(compliances, mean, ("o", "s")[t], color=color_of(t), label=name)
             ax.plot(compliances, slope * compliances + intercept, color=color_of(t))
         lines.append((fitted[0], fitted[1]))

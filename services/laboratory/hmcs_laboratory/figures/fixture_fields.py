@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.fixtures.guides.pull import project_to_path, pulled_direction
-from hmcs.fixtures.guides.volumes import Knot, Volume
+from hmcs.fixtures.guides.volumes import volume_radius_m, volume_stiffness
 from hmcs.fixtures.law import full_speed_gains
 from hmcs.fixtures.parts import PreferredSubspace
 from hmcs.fixtures.regions.forbidden import Box, Region, nearby, sphere
 from hmcs.fixtures.regions.keep_out import KeepOut
 from hmcs.motion.paths import Path
+from hmcs.task.fixture_parts import VolumeKnot, VolumeSetup
 from hmcs_laboratory.data.hands import Count, Positive
 from hmcs_laboratory.figures.drawing import COLORS, INK, WRONG_COLOR, Drawn, new_picture
 from hmcs_laboratory.study import StudySettings
@@ -109,7 +110,7 @@ def tubes(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
     del rng
     return _volume_drawn(
         settings,
-        Volume((Knot(0.0, 0.015),), 0.005),
+        _volume((0.0, 0.015)),
         "Within 15 mm of the curve the hand's velocity passes unchanged; outside it is led back.",
     )
 
@@ -119,7 +120,7 @@ def cones(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
     del rng
     return _volume_drawn(
         settings,
-        Volume((Knot(0.0, 0.04), Knot(1.0, 0.002)), 0.005),
+        _volume((0.0, 0.04), (1.0, 0.002)),
         "The free space narrows from 40 mm to the target's 2 mm; outside the hand is led back.",
         Path(np.array([[0.0, 0, 0], [0.2, 0, 0]])),
     )
@@ -128,10 +129,9 @@ def cones(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
 def joined_volumes(settings: FieldSettings, rng: np.random.Generator) -> Drawn:
     """Draw figure 2.17: tubes and a cone joined to a safe approach."""
     del rng
-    knots = (Knot(0.0, 0.012), Knot(0.45, 0.012), Knot(0.6, 0.035), Knot(1.0, 0.002))
     return _volume_drawn(
         settings,
-        Volume(knots, 0.005),
+        _volume((0.0, 0.012), (0.45, 0.012), (0.6, 0.035), (1.0, 0.002)),
         "A tube of 12 mm opens smoothly into a cone that ends at the target.",
     )
 
@@ -155,14 +155,23 @@ def _guided(settings: FieldSettings, factor: float, path: Path = CURVE) -> Field
     return field
 
 
-def _volume_drawn(settings: FieldSettings, volume: Volume, found: str, path: Path = CURVE) -> Drawn:
+def _volume(*knots: tuple[float, float]) -> VolumeSetup:
+    """A volume of so many knots: progress, and radius in m."""
+    return VolumeSetup(
+        knots=tuple(VolumeKnot(progress=share, radius_m=radius_m) for share, radius_m in knots)
+    )
+
+
+def _volume_drawn(
+    settings: FieldSettings, volume: VolumeSetup, found: str, path: Path = CURVE
+) -> Drawn:
     picture = new_picture(4.0, 7.0)
     ax = picture.subplots()
 
     def field(place: Array, velocity: Array) -> Array:
         at = project_to_path(path, place, 0.0, path.length_m)
         error_m = float(np.linalg.norm(at.across))
-        share = volume.stiffness(at.progress_m / path.length_m, error_m)
+        share = volume_stiffness(volume, at.progress_m / path.length_m, error_m)
         if share == 0.0:
             return velocity
         return _guided(settings, FREE_FACTOR + share * (0.95 - FREE_FACTOR), path)(place, velocity)
@@ -175,7 +184,7 @@ def _volume_drawn(settings: FieldSettings, volume: Volume, found: str, path: Pat
     tangents = np.gradient(centers, axis=0)
     normals = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    radii = np.array([volume.radius_m(s / path.length_m) for s in places])
+    radii = np.array([volume_radius_m(volume, s / path.length_m) for s in places])
     for side in (-1.0, 1.0):
         wall = centers[:, :2] + side * radii[:, None] * normals
         ax.plot(*(MM * wall.T), color=COLORS[2], linewidth=1.6)
