@@ -22,7 +22,7 @@ IN_PARALLEL := -n auto --maxprocesses 4 --dist loadfile
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long lint bench safety peers test-browser pictures schemas manifests fuzz test-containers clean
+.PHONY: help setup demo test test-long lint bench safety peers docs test-browser pictures schemas manifests fuzz test-containers clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | \
@@ -58,6 +58,12 @@ safety: $(READY) ## measure what keeps the robot safe, a thousand faults among i
 peers: $(READY) ## install the libraries that studies compare with, beside the rest
 	@$(UV) sync --frozen --quiet --group peers --python $(RUN)/python
 
+docs: $(READY) ## build the documents and the API as a site, out/docs/index.html, and check its links
+	@$(UV) sync --frozen --quiet --inexact --group docs --python $(RUN)/python
+	@$(RUN)/python -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs/site \
+	    --doctree-dir out/docs-cache . out/docs
+	@$(RUN)/python docs/site/links.py out/docs
+
 test-browser: $(READY) ## drive the operator's page in a chromium, with playwright installed beside the rest
 	@$(UV) sync --frozen --quiet --inexact --group browser --python $(RUN)/python
 	@$(BEFORE_OTHERS) $(RUN)/python -m pytest -m browser tests/browser
@@ -81,8 +87,8 @@ fuzz: $(READY) ## a million hostile messages and ten thousand questions at the s
 test-containers: $(READY) ## build the images and run the stack in a Docker engine
 	@$(RUN)/python -m pytest -m containers tests/containers
 
-clean: ## remove .venv, reports and caches
-	rm -rf $(VENV) out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+clean: ## remove .venv, reports, the site and caches
+	rm -rf $(VENV) out dist docs/api .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # An environment of another Python, or moved from another folder, is made anew.

@@ -160,13 +160,14 @@ def _envelope() -> Iterator[str]:
 def _messages() -> Iterator[str]:
     yield "## Messages\n"
     for message in MESSAGES:
-        yield from _part(message, f" `{schema_of(message)}`")
+        # A heading of the name alone: links to it are made of all its words.
+        yield from _part(message, f"`{schema_of(message)}`. ")
         yield f"At most {_size(message)}: {BOUNDS[message].reason}\n"
 
 
-def _part(part: type[Part], suffix: str = "") -> Iterator[str]:
-    yield f"### {part.__name__}{suffix}\n"
-    yield f"{_sentence(part.__doc__ or '')}\n"
+def _part(part: type[Part], schema: str = "") -> Iterator[str]:
+    yield f"### {part.__name__}\n"
+    yield f"{schema}{_sentence(part.__doc__ or '')}\n"
     if part.model_fields:
         yield "| field | type | |"
         yield "|---|---|---|"
