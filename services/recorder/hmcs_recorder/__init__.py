@@ -1,1 +1,5 @@
-"""Recordings: written while the stack runs, read, exported and replayed afterwards."""
+"""The recorder: writes what is published into MCAP files while the stack runs.
+
+Open `service` first; `labeling` writes the labels of a recording. The files themselves are the
+work of `hmcs.recordings`.
+"""
