@@ -112,6 +112,23 @@ def test_in_the_plane_size_and_turn_are_exact():
     np.testing.assert_allclose(alignment.turned(belief, turned, back=True), directions)
 
 
+def test_turned_with_its_gesteme_a_motion_is_as_probable_as_it_was():
+    rng = np.random.default_rng(6)
+    means, variances, possible = random_gestemes(2, rng)
+    phases = alignment.phases_of(means, variances, possible, ALIGNMENT)
+    learned = alignment.as_learned(1, 2)._replace(information=np.array([1e12]))
+    c, s = np.cos(TURN_RAD), np.sin(TURN_RAD)
+    rotated = learned._replace(growth=np.array([c - 1.0]), turn=np.array([[s]]))
+    rotation = np.array([[c, -s], [s, c]])
+    gesteme, where = np.zeros(1, dtype=np.int32), rng.normal(size=(1, 2))
+    direction = np.array([0.6, 0.8])
+    np.testing.assert_allclose(
+        alignment.log_densities(phases, rotated, gesteme, where @ rotation.T, rotation @ direction),
+        alignment.log_densities(phases, learned, gesteme, where, direction),
+        rtol=1e-6,
+    )
+
+
 def test_to_stand_still_has_no_direction_however_it_is_turned():
     belief = walked(3, np.random.default_rng(4))[-1]
     nowhere = np.zeros((PAIRS, 3))

@@ -66,3 +66,47 @@ def test_a_turn_is_a_sign_of_leaving_near_the_end_only():
 
     assert turn(2.5) == pytest.approx(turn(0.0) * np.exp(-0.5))
     assert turn(6.0) < 0.1 * turn(0.0)
+
+
+def at(steps_past_the_end: float, turned_by: float = 0.0, remaining: float = 0.0) -> np.ndarray:
+    """Features of a hand on the line through the end, which turns by so much in its last step."""
+    place, normal = np.array([[steps_past_the_end, 0.0]]), np.array([[1.0, 0.0]])
+    innovation = np.array([[np.cos(turned_by) - 1.0, np.sin(turned_by)]])
+    return exit_features(np.array([remaining]), place, normal, innovation)
+
+
+def test_a_hand_past_the_end_is_likelier_to_leave_than_one_as_far_short_of_it():
+    for steps in (1.0, 2.0, 4.0):
+        short, past = (exit_probability(DEFAULT_WEIGHTS, at(side * steps)) for side in (-1, 1))
+        assert past > short + 0.1
+
+
+def test_before_the_end_eight_steps_count_and_past_it_four():
+    def line(place: float) -> float:
+        return float(at(place)[0, 5])
+
+    assert [line(place) for place in (-5.0, -1.0, 1.0, 3.0)] == [-5.0, -1.0, 1.0, 3.0]
+    assert line(-8.0) == line(-50.0) < line(-7.0)
+    assert line(4.0) == line(50.0) > line(3.5)
+    # What is far on either side can be told from what is near, whatever the side.
+    assert at(-3.0)[0, 6] == at(3.0)[0, 6] > at(1.0)[0, 6] > 0
+
+
+def test_turning_right_round_is_the_largest_turn():
+    turns = [float(at(0.0, angle)[0, 8]) for angle in (0.0, 0.5, 1.0, 2.0, np.pi)]
+    assert (np.diff(turns) > 0).all()
+    farther = exit_features(np.zeros(1), np.zeros((1, 2)), np.eye(2)[:1], np.array([[-3.0, 0.0]]))
+    assert farther[0, 8] == pytest.approx(turns[-1])
+
+
+def test_a_hand_that_went_on_after_all_is_soon_believed_to():
+    # However sure the regression is that it leaves, three nats of evidence make up for it.
+    assert -np.log(1.0 - HIGHEST) < 3.1
+
+
+def test_the_regression_finds_its_optimum_also_where_one_line_parts_the_examples():
+    features = np.vstack([approach(12) for _ in range(30)])
+    left = np.tile(np.arange(13) == 12, 30)
+    weights = fit_exit(features, left)
+    p = 1 / (1 + np.exp(-features @ weights))
+    np.testing.assert_allclose(features.T @ (left - p), 0.05 * weights, atol=1e-6)

@@ -235,9 +235,55 @@ def test_what_is_dropped_does_not_come_back():
     believed = {}
     for name, dropping in (("dropped", strict), ("kept", strict._replace(drop_below=0.0))):
         task_filter = SegmentFilter(chain, dropping)
-        task_filter.step(pairs(0, {(0, 0): (0.0, 12.0), (1, 0): (0.0, 0.0)}))
+        belief = task_filter.step(pairs(0, {(0, 0): (0.0, 12.0), (1, 0): (0.0, 0.0)}))
+        assert belief.states.sum() + belief.unknown == pytest.approx(1.0, abs=1e-12)
         # What was all but impossible would be nearly certain now.
         belief = task_filter.step(pairs(1, {(0, 0): (0.0, 0.0), (1, 0): (0.0, 40.0)}))
         believed[name] = belief.states[1]
     assert believed["kept"] > 0.99
     assert believed["dropped"] == 0.0
+
+
+@pytest.mark.parametrize("others", [{(0, 1): (0.0, 0.0)}, {(1, 0): (0.0, 0.0)}])
+def test_a_start_that_a_classifier_names_no_more_is_impossible(others):
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS._replace(drop_below=1e-6))
+    # Step by step it becomes all but certain that gesteme 0 is going on since the first step.
+    belief = task_filter.step(pairs(0, {(0, 0): (0.0, 9.0), (1, 0): (0.0, 0.0)}))
+    assert belief.states[0] > 0.99
+    belief = task_filter.step(pairs(1, others))
+    assert belief.states[0] < 0.7
+    assert (belief.gesteme, belief.segment_start) != (0, 0)
+
+
+def test_where_nothing_of_the_task_is_left_a_segment_may_only_begin_now():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    task_filter.step(pairs(0, {(0, 0): (0.0, 0.0), (1, 0): (0.0, 0.0)}))
+    belief = task_filter.step(pairs(1, {(0, 0): (0.0, -np.inf)}))
+    assert belief.unknown == 1.0
+    assert belief.segment_start == 1
+
+
+def test_the_likely_segment_is_one_of_the_likely_state():
+    # State 0 has two gestemes of three tenths each, state 1 one of four tenths.
+    chain = TaskChain(
+        np.array([0.6, 0.4]),
+        np.eye(2),
+        np.array([0, 0, 1], dtype=np.int32),
+        np.array([0, 1, 2], dtype=np.int32),
+        np.array([0.5, 0.5, 1.0]),
+    )
+    begun = {(g, 0): (0.0, 0.0) for g in range(3)}
+    belief = SegmentFilter(chain, SETTINGS).step(pairs(0, begun, gestemes=(0, 1, 2)))
+    assert belief.states.argmax() == 0
+    assert belief.gesteme in (0, 1)
+
+
+def test_evidence_however_strong_leaves_numbers():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    task_filter = SegmentFilter(chain, SETTINGS)
+    belief = task_filter.step(pairs(0, {(0, 0): (0.0, 2_000.0), (1, 0): (0.0, -2_000.0)}))
+    assert belief.states[0] == pytest.approx(1.0)
+    begun = chain.initial[0] * (1 - SETTINGS.unknown_after)
+    assert belief.log_likelihood == pytest.approx(2_000.0 + np.log(begun), abs=1e-9)

@@ -8,7 +8,7 @@ from hmcs.motion.steps import steps_of_demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
-from hmcs.recognition.segment_filter.senses import Senses, SenseWeights, log_densities
+from hmcs.recognition.segment_filter.senses import Senses, SenseWeights, floors_of, log_densities
 from hmcs.recognition.segments import LearningError
 
 FORCE_N = {"go": 3.0, "turn": -3.0, "rise": 0.0}
@@ -75,3 +75,11 @@ def test_silence_counts_as_the_sense_does_on_average():
     squares = ((drawn - means) ** 2 / variances).mean(axis=0)
     average = (-0.5 * senses.weights * (squares + np.log(2 * np.pi * variances))).sum(axis=2)
     np.testing.assert_allclose(log_densities(senses, np.full(3, np.nan)), average, atol=0.05)
+
+
+def test_no_phase_is_surer_of_a_sense_than_a_quarter_of_its_spread():
+    rng = np.random.default_rng(0)
+    spread = np.array([0.1, 4.0, 0.0])
+    rows = [rng.normal(0, spread, (400, 3)) for _ in range(20)]
+    # What never varies is as sure as the finest device.
+    np.testing.assert_allclose(np.sqrt(floors_of(rows)), [0.025, 1.0, 1e-3], rtol=0.05)
