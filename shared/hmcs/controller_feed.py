@@ -14,7 +14,7 @@ from hmcs.bus.counters import Sequences
 from hmcs.bus.messages import Belief, Motion, Origin, RobotState, Source, Step
 from hmcs.driving import Device, FollowingRobot, heard_device, heard_robot
 from hmcs.fixtures.controller.controller import Controller
-from hmcs.fixtures.controller.interface import Fixture
+from hmcs.fixtures.controller.interface import Fixture, Guides
 from hmcs.translation import sample_of, segment_belief_of
 
 Verdict = Literal["taken", "second", "old", "early", "other_clock"]
@@ -38,6 +38,17 @@ class ControllerFeed:
         """Boot of the device whose steps count."""
         self._newest = -1
         self._begin_orders()
+
+    def load(self, name: str, guides: Guides) -> None:
+        """Make a recognizer known, instead of another of that name and what that one believed."""
+        self._early.pop(name, None)
+        self.controller.load(name, guides)
+
+    def unload(self, name: str) -> None:
+        """Forget a recognizer and what it believed, unless it is the active one."""
+        if name != self.controller.active:
+            self._early.pop(name, None)
+        self.controller.unload(name)
 
     def on_motion(
         self, now_s: float, source: Source, seq: int, motion: Motion, origin: Origin | None

@@ -55,12 +55,12 @@ class Scene:
         origin = Origin(boot=boot, seq=self.seq, captured_ns=0)
         return self.feed.on_step(self.now_s, source(boot), step, origin)
 
-    def believe(self, step: int, clock: str = "a", **said: Any) -> str:
+    def believe(self, step: int, clock: str = "a", name: str = "m", **said: Any) -> str:
         fields: dict[str, Any] = {
             "model_hash": "h", "clock": clock, "step": step, "states": ("s",),
             "probabilities": np.array([1.0]), "likely_gesteme": "g", "segment_start": 0,
         }  # fmt: skip
-        return self.feed.on_belief("m", Belief(**(fields | said)))
+        return self.feed.on_belief(name, Belief(**(fields | said)))
 
     def guide(self, count: int) -> Fixture | None:
         """Move `a` on, each sample a step with its belief."""
@@ -118,6 +118,37 @@ def test_a_belief_that_overtook_its_step_counts_once_the_step_is_there() -> None
     assert scene.believe(scene.step) == "early"
     scene.make_step("a", scene.step)
     assert scene.believe(scene.step) == "old"
+
+
+def test_a_belief_that_overtook_its_step_goes_with_its_recognizer() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(40)
+    scene.feed.load("other", Guides({"g": PATH}, Rules()))
+    assert scene.believe(scene.step, name="other") == "early"
+    scene.feed.unload("other")
+    assert scene.make_step("a", scene.step) == "taken"
+    assert "other" not in scene.feed.controller._recognizers.beliefs
+
+
+def test_a_belief_that_overtook_its_step_is_none_of_the_model_loaded_in_between() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(40)
+    assert scene.believe(scene.step) == "early"
+    scene.feed.load("m", Guides({"g": PATH}, Rules()))
+    scene.make_step("a", scene.step)
+    assert "m" not in scene.feed.controller._recognizers.beliefs
+
+
+def test_the_active_recognizer_is_not_unloaded_nor_its_early_belief_lost() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(40)
+    assert scene.believe(scene.step) == "early"
+    scene.feed.unload("m")
+    scene.make_step("a", scene.step)
+    assert scene.feed.controller._recognizers.beliefs["m"].step == scene.step
 
 
 @given(st.integers(0, 2**53))

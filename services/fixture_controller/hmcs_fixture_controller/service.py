@@ -213,8 +213,8 @@ class FixtureController(Service):
             return
         if name not in self._recognizers:
             for forgotten in self._recognizers.lend(name, known, keep=self._controller.active):
-                self._controller.unload(forgotten)
-            self._controller.load(name, known.guides)
+                self._feed.unload(forgotten)
+            self._feed.load(name, known.guides)
         try:
             verdict = self._feed.on_belief(name, belief)
         except ValueError as error:
@@ -320,7 +320,7 @@ class FixtureController(Service):
         )
 
     def _adopt(self, model: Model, guides: Guides) -> str:
-        self._controller.load(model.name, guides)
+        self._feed.load(model.name, guides)
         self._recognizers.take(Loaded(model, guides))
         self.log.info("model loaded", extra={"model": model.name, "hash": model.hash})
         return f"model {model.name} {model.hash} is loaded"
