@@ -101,6 +101,20 @@ def test_steps_of_another_device_than_the_one_that_drives_are_no_steps() -> None
     assert scene.believe(0, clock="b") == "other_clock"
 
 
+def test_a_sample_of_another_device_than_the_one_that_drives_moves_nothing() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    assert scene.samples(10, a=True).engaged
+    assert scene.sample("b", True) is None
+    assert scene.sample("b", False) is None
+
+
+def test_steps_count_though_no_sample_was_heard_yet() -> None:
+    scene = Scene()
+    assert scene.make_step("a", 0) == "taken"
+    assert scene.believe(0) == "taken"
+
+
 def test_the_steps_of_a_new_device_begin_anew() -> None:
     scene = Scene()
     scene.samples(10, a=False)
@@ -180,6 +194,8 @@ def test_a_belief_far_ahead_of_all_steps_is_no_belief() -> None:
     scene.samples(10, a=False)
     scene.guide(3)
     assert scene.believe(3 + EARLY_WITHIN) == "old"
+    # A recognizer may be ahead by what is under way.
+    assert scene.believe(3 + 30) == "early"
 
 
 # --- robots ---------------------------------------------------------------------------------------

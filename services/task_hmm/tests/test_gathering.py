@@ -74,6 +74,17 @@ def test_the_first_evidence_for_a_gesteme_wins():
     assert released is not None
     by_gesteme = dict(zip(released.pair_gesteme, released.log_ratio, strict=True))
     assert by_gesteme == {0: 1.0, 1: 1.0, 2: 3.0}
+    assert len(released.evidence.exit) == len(released.evidence.pair_start) == 3
+
+
+def test_gestemes_are_in_order_whichever_classifier_was_first():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.add(evidence(0, {2}), 0)
+    g.add(evidence(0, {0, 1}), 0)
+    released = g.release(now_ns=0)
+    assert released is not None
+    assert released.evidence.gestemes == (0, 1, 2)
 
 
 def test_evidence_that_overtakes_its_step_waits_for_it():
@@ -91,6 +102,23 @@ def test_evidence_for_a_step_released_at_its_deadline_is_late(arrived_ns):
     g.caught_up(DEADLINE_NS)
     g.release(now_ns=DEADLINE_NS)
     assert g.add(evidence(0, {0}), arrived_ns) == "late"
+
+
+def test_a_deadline_that_has_passed_has_passed_whatever_older_evidence_is_handled_later():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.caught_up(DEADLINE_NS)
+    g.add(evidence(1, {0}), DEADLINE_NS - 5)
+    assert g.release(now_ns=DEADLINE_NS) is not None
+
+
+def test_evidence_that_arrived_at_the_deadline_tells_that_it_has_passed():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.add(evidence(1, {0}), DEADLINE_NS - 1)
+    assert g.release(now_ns=DEADLINE_NS) is None
+    g.add(evidence(1, {1}), DEADLINE_NS)
+    assert g.release(now_ns=DEADLINE_NS) is not None
 
 
 def test_evidence_of_a_released_step_is_not_kept():
@@ -144,6 +172,23 @@ def test_after_a_restart_only_later_steps_count():
     released = g.release(now_ns=0)
     assert released is not None
     assert released.step == 40
+
+
+def test_a_restart_forgets_what_came_for_steps_of_the_same_numbers():
+    g = gathering()
+    g.begin(0, now_ns=0)
+    g.add(evidence(0, {0, 1, 2}), 0)
+    assert g.release(now_ns=0) is not None
+    g.begin(40, now_ns=0)
+    g.add(evidence(40, {0, 1}, ratio=1.0), 0)
+    g.restart(40)
+    assert g.due_ns is None
+    assert g.add(evidence(0, {0}), 1) == "late"
+    g.begin(40, now_ns=5)
+    assert g.add(evidence(40, {0, 1, 2}, ratio=2.0), 5) == "taken"
+    released = g.release(now_ns=5)
+    assert released is not None
+    np.testing.assert_array_equal(released.evidence.log_ratio, [2.0] * 3)
 
 
 @given(st.data())
