@@ -280,6 +280,42 @@ def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> N
     assert listener.steps[-1] == 5
 
 
+def test_a_pairing_without_a_device_leaves_it_to_who_is_heard() -> None:
+    bus = FakeBus()
+    listener = Listener(bus)
+    bus.pair("")
+    bus.hear(0)
+    assert listener.steps == [0]
+
+
+def test_a_pairing_that_is_heard_again_changes_nothing() -> None:
+    bus = FakeBus(kept=range(3))
+    listener = Listener(bus)
+    for _ in range(3):
+        bus.pair("boot-1")
+    bus.hear(3)
+    assert listener.told == [("restart", 0), *(("step", k) for k in range(4))]
+
+
+def test_who_hears_a_late_step_first_is_given_as_many_before_it_as_it_remembers() -> None:
+    bus = FakeBus()
+    listener = Listener(bus, memory_steps=5)
+    bus.kept = range(40)
+    bus.hear(40)
+    assert listener.told == [("restart", 35), *(("step", k) for k in range(35, 41))]
+
+
+def test_however_often_a_step_comes_again_its_device_is_asked_once_a_second() -> None:
+    bus = FakeBus()
+    Listener(bus)
+    for index in range(4):
+        bus.hear(index)
+    asked = len(bus.questions)
+    for _ in range(30):
+        bus.hear(1)
+    assert len(bus.questions) - asked == 1
+
+
 DAMAGED: dict[str, dict[str, Any]] = {
     "a step is missing": {"steps": (step(4), step(6), step(7)), "origins": (ORIGIN,) * 3},
     "a sample is missing": {"origins": (ORIGIN,) * 4},
