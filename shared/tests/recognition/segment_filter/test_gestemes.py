@@ -146,6 +146,22 @@ def test_a_classifier_with_no_living_pair_still_speaks(model):
     assert len(evidence[-1].pair_start) == 0
 
 
+def test_a_leap_that_no_phase_explains_leaves_numbers(model):
+    lenient = model.knowledge.scoring._replace(prune_nats=np.inf)
+    bank = GestemeBank(model.knowledge.parameters, lenient, model.axes, range(3))
+    leap = np.array([9.0, 9.0, 9.0])
+    evidence = [bank.step(Step(t, t * leap, leap)) for t in range(3)]
+    assert [len(item.pair_start) for item in evidence] == [3, 6, 9]
+    assert all(np.isfinite(item.log_ratio).all() for item in evidence)
+    assert all(np.isfinite(item.exit).all() for item in evidence)
+
+
+def test_a_step_along_none_of_the_axes_looked_at_has_no_direction(model):
+    evidence = bank_of(model).step(Step(0, np.zeros(3), np.zeros(3)))
+    assert len(evidence.pair_start) == 3
+    assert np.isfinite(evidence.log_ratio).all()
+
+
 def test_pruning_changes_no_belief(model, steps):
     unpruned = model.knowledge.scoring._replace(prune_nats=np.inf)
     full = GestemeBank(model.knowledge.parameters, unpruned, model.axes, range(3))
@@ -223,3 +239,24 @@ def test_a_gesteme_performed_turned_is_no_sign_of_leaving_it(bank_of_round, mode
     # Its end is near, and the step went as it was expected to.
     assert features[7] > 0.5
     assert features[8] < 0.25 * turn_rad**2 + 0.02
+
+
+@pytest.mark.parametrize("turn_rad", [-0.4, 0.4])
+def test_the_end_of_a_gesteme_performed_turned_is_passed_in_the_turned_direction(
+    bank_of_round, model, turn_rad
+):
+    parameters = model.knowledge.parameters
+    bank, path = bank_of_round(0.3), performed_round(parameters.step_m, 1.0, turn_rad)
+    for step in path:
+        bank.step(step)
+    growth, turn = 1 + bank.similarity.growth[0], bank.similarity.turn[0]
+
+    def performed(vector):
+        return growth * vector + np.cross(turn, vector)
+
+    there = path[-1].position + path[-1].displacement
+    from_end = there - performed(parameters.ends[1, 0])
+    normal = performed(parameters.normals[1, 0])
+    along = from_end @ normal / np.linalg.norm(normal) / parameters.step_m
+    assert bank.exit_features[0, 5] == pytest.approx(along)
+    assert np.sign(turn[2]) == np.sign(turn_rad)
