@@ -96,8 +96,8 @@ class _Escaping(string.Formatter):
         """Escape whatever is no number and no Markdown."""
         if isinstance(value, Markdown):
             return value
-        told = str(super().format_field(value, format_spec))
-        return told if isinstance(value, int | float) else as_markdown(told)
+        formatted = str(super().format_field(value, format_spec))
+        return formatted if isinstance(value, int | float) else as_markdown(formatted)
 
 
 _ESCAPING = _Escaping()

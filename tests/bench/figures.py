@@ -1,4 +1,4 @@
-"""A figure, its goal, and how both are told."""
+"""A figure, its goal, and how both are printed."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from bench.whole_stack import SHAPES
 from hmcs.motion.demonstrations import Demonstration, read_csv
 from hmcs.recognition.model_file import load_model
 from hmcs.recordings.comparing import compared, fixtures_compared
-from hmcs.recordings.guiding import guided
+from hmcs.recordings.fixture_replay import replay_fixture
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import replayed
 from hmcs.task import load_task
@@ -47,7 +47,7 @@ def measure(repeats: int) -> list[Figure]:
         for _ in range(repeats):
             replay = replayed(content, model)
             beliefs.append(compared(replay))
-            fixtures.append(fixtures_compared(guided(content, replay)))
+            fixtures.append(fixtures_compared(replay_fixture(content, replay)))
     same = beliefs[0].same_bits / beliefs[0].steps
     return [
         Figure("learning five states from three demonstrations, with the report",

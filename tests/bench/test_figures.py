@@ -1,4 +1,4 @@
-"""Every figure in a short form, told with `-s`; `make bench` measures them in full.
+"""Every figure in a short form, printed with `-s`; `make bench` measures them in full.
 
 Only what a busy machine cannot spoil is asserted: what is right, and that nothing is lost. Speed is
 held against its goals by `make bench` alone.

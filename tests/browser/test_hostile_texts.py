@@ -27,7 +27,7 @@ from hmcs.bus.messages import (
     Outline,
     OutlineQuestion,
     Record,
-    RobotLooks,
+    RobotDescription,
     RobotState,
     TrainingProgress,
 )
@@ -45,7 +45,7 @@ JOINER = "\u2060"
 LOOK = """() => document.body.innerText + [...document.querySelectorAll("input")].map(
   input => "\\n" + input.value).join("")"""
 KEPT_AS_NAMES = {("Belief", ("model_hash",)), ("Belief", ("clock",))}
-"""By which beliefs are told apart."""
+"""By which beliefs are distinguished."""
 TRIED = tuple(text for text in HOSTILE if re.search(r"ran|evil|display|passwd|\*|\u202e", text))
 """Those that would do something in a browser; the others are tried without one."""
 DRAWN_S = 60.0
@@ -73,7 +73,7 @@ class Stranger:
             (bus.publisher(Evidence, keys.evidence(MODEL, "stranger")), Evidence),
             (bus.publisher(TrainingProgress, keys.training), TrainingProgress),
         ]
-        bus.answer("looks", Ask, lambda _: self.saying(RobotLooks))
+        bus.answer("looks", Ask, lambda _: self.saying(RobotDescription))
         bus.answer("stop", Ask, lambda _: self.saying(Done))
         recorder = self.buses["recorder"]
         recorder.answer("outline", OutlineQuestion, lambda _: self.saying(Outline))

@@ -59,7 +59,7 @@ _LOOK_S = 0.05
 
 
 class Heard:
-    """What handles and robot have told, every message with its time of arrival."""
+    """The messages of handles and robot, each with its time of arrival."""
 
     def __init__(self, bus: Bus) -> None:
         self.handles: list[tuple[int, Handle]] = []

@@ -19,7 +19,7 @@ from hmcs.bus.messages import (
     OutlineQuestion,
     Record,
     Refusal,
-    RobotLooks,
+    RobotDescription,
     SetLabels,
     SettingsReport,
     Step,
@@ -29,7 +29,7 @@ from hmcs.bus.qos import QOS_PROFILES, QosProfile
 
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
-    ActivateRecognizer, RobotLooks, Record, Train, OutlineQuestion, Outline, SetLabels, Done,
+    ActivateRecognizer, RobotDescription, Record, Train, OutlineQuestion, Outline, SetLabels, Done,
 }  # fmt: skip
 
 

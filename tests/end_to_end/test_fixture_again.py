@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hmcs.recordings.comparing import CLOSE, compared, fixtures_compared
-from hmcs.recordings.guiding import Guided, guided
+from hmcs.recordings.fixture_replay import FixtureReplay, replay_fixture
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import kept_model, replayed
 from support.hand import PERIOD_S, Watcher
@@ -27,7 +27,7 @@ TICKS = 5
 something: then k, on its way up or down, is what it was at a neighboring tick."""
 
 
-def alike_within_ticks(fixture: Guided) -> float:
+def alike_within_ticks(fixture: FixtureReplay) -> float:
     """The share of ticks with the same k as at that tick, or one of its neighbors."""
     pairs = [(tick.now.factor, tick.then.factor) for tick in fixture.ticks if tick.then]
     now, then = np.array(pairs).T
@@ -61,7 +61,7 @@ def test_with_the_same_model_the_fixture_would_have_done_what_it_did(
     (file,) = folder.glob("*.mcap")
     content = read(file)
     replay = replayed(content, kept_model(content))
-    fixture = guided(content, replay)
+    fixture = replay_fixture(content, replay)
     beliefs = compared(replay)
     assert beliefs.same_bits == beliefs.compared > 60
     # The recording may end between the last step and the belief after it.

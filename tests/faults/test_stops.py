@@ -48,7 +48,7 @@ def test_a_robot_that_hung_stands_until_re_engaged(fast_loop: FastLoop) -> None:
     stopped = next(i for i, r in enumerate(watcher.robot) if r.body.stop == "stale_command")
     stack.until(lambda: any(_moves(r) for r in watcher.robot[stopped:]))
 
-    assert stopped <= 3, "only what was under way when it hung may still be told"
+    assert stopped <= 3, "only what was under way when it hung may still be sent"
     moved_ns = next(r.received_ns for r in watcher.robot[stopped:] if _moves(r))
     assert any(r.received_ns < moved_ns and not r.body.dead_man for r in watcher.motions)
     assert stack.health(robot).healthy

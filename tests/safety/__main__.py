@@ -1,4 +1,4 @@
-"""`python -m safety NAME`: one campaign against the stack, told with its goals."""
+"""`python -m safety NAME`: one campaign against the stack, printed with its goals."""
 
 from __future__ import annotations
 

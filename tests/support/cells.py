@@ -17,8 +17,8 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import DeadZone
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import recognizer_of
-from hmcs.recordings.parts import Preface, Recording
-from hmcs.recordings.plain import fields_of
+from hmcs.recordings.file_rotation import Preface, Recording
+from hmcs.recordings.json_codec import fields_of
 from hmcs.translation import belief_message, guides_of, sample_of, segment_belief_of, step_of
 from hmcs_fixture_controller.settings import FixtureControllerSettings
 from hmcs_fixture_controller.translation import command_of, state_of
@@ -50,7 +50,7 @@ def performance(
 ) -> Iterator[Logged]:
     """Yield what is said while an operator performs, guided by a model's recognizer.
 
-    The robot does what it is told at once; beliefs come while the next sample is not there yet.
+    The robot carries out commands at once; beliefs come while the next sample is not there yet.
     """
     controller = Controller(SETTINGS.safeguards)
     controller.load(model.name, guides_of(model))

@@ -23,7 +23,7 @@ POINTER = Usual("position", AxisMap("none", "-x", "y"), STICK.buttons, has=("x",
 
 
 class FakeDevice:
-    """A device that says what it is told to."""
+    """A device whose samples a test sets."""
 
     name = "stick"
 

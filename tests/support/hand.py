@@ -34,7 +34,7 @@ RESTING = 20
 
 
 class Hand:
-    """Publishes exactly the steps and samples it is told to, and answers `last_steps`."""
+    """Publishes exactly the steps and samples it is given, and answers `last_steps`."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus

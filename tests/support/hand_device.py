@@ -10,7 +10,7 @@ from hmcs_input_device.sources import LIVE, DeviceSample
 
 
 class Hand:
-    """A device that says what it is told to."""
+    """A device whose samples a test sets."""
 
     rate_hz, duration_s, reach_m = 200.0, LIVE, None
 

@@ -9,7 +9,7 @@ from hmcs.recognition.segment_filter.exits import DEFAULT_WEIGHTS
 from hmcs.recognition.segment_filter.filter import FilterSettings
 from hmcs.recognition.segment_filter.gestemes import GestemeParameters, Scoring
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
-from hmcs.recognition.segment_filter.senses import Senses
+from hmcs.recognition.segment_filter.sensor_densities import SensorDensities
 from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
 
@@ -38,7 +38,7 @@ def line_model(name: str, task: Task, points: np.ndarray) -> Model:
                 normals=np.zeros((1, 1, 3)),
                 exit_weights=DEFAULT_WEIGHTS,
                 step_m=0.01,
-                senses=Senses((), np.zeros((1, 2, 0)), np.ones((1, 2, 0)), np.zeros(0)),
+                senses=SensorDensities((), np.zeros((1, 2, 0)), np.ones((1, 2, 0)), np.zeros(0)),
             ),
             Scoring(0.0, 1.0, 100, 30.0),
             FilterSettings(),

@@ -29,7 +29,7 @@ def grown_mb(preparation: str, work: str, *arguments: object) -> float:
     Both are source text; `sys.argv` holds the arguments.
     """
     if not _STATUS.exists():
-        pytest.skip("the peak memory of a process is told by Linux alone")
+        pytest.skip("only Linux reports the peak memory of a process")
     done = subprocess.run(
         [sys.executable, "-c", _MEASURED.format(preparation=preparation, work=work)]
         + [str(each) for each in arguments],

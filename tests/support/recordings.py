@@ -12,8 +12,8 @@ from hmcs.bus.keys import Keys
 from hmcs.bus.messages import Envelope, Label, Message, Motion, Source, Step
 from hmcs.bus.wire import encode
 from hmcs.motion.steps import DeadZone
-from hmcs.recordings.parts import Limits, Preface, Recording
-from hmcs.recordings.plain import fields_of
+from hmcs.recordings.file_rotation import Limits, Preface, Recording
+from hmcs.recordings.json_codec import fields_of
 
 KEYS = Keys("test")
 HAND = Source(service="input_device", instance="hand", boot="clock")

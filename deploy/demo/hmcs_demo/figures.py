@@ -23,7 +23,7 @@ from hmcs_demo.summary import Summary
 from hmcs_demo.tracks import Track, recognized
 
 COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
-"""Told apart by all kinds of color vision; states beyond them begin again."""
+"""Distinct for all kinds of color vision; states beyond them begin again."""
 UNKNOWN_COLOR = "#8C8C8C"
 INK = "#222222"
 GRID_COLOR = "#e6e6e6"

@@ -17,7 +17,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.scoring import NONE, Scores, midway_labels, score
 from hmcs_demo.recording import NO_SAMPLE, Beliefs, Recording
 from hmcs_demo.tracks import Track, track
-from hmcs_demo.truth import RunError, SampleClock, Segment
+from hmcs_demo.truth import RunError, SampleClock, TrueStateInterval
 
 IntArray = NDArray[np.int64]
 
@@ -40,7 +40,7 @@ class Measured(NamedTuple):
 
     states: tuple[str, ...]
     clock: SampleClock
-    segments: tuple[Segment, ...]
+    segments: tuple[TrueStateInterval, ...]
     step_end: IntArray
     """Number of the played sample that completed each step, shape (T,)."""
     step_time_s: Array

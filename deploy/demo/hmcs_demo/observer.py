@@ -41,7 +41,7 @@ Rows = list[tuple[Any, ...]]
 
 
 class ObserverSettings(ServiceSettings):
-    """What the observer can be told."""
+    """Settings of the observer."""
 
     output: Path
     """Where the recording is written when the observer is stopped."""

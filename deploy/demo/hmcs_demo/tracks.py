@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hmcs.arrays import Array
 from hmcs.motion.paths import Path
-from hmcs_demo.truth import Segment
+from hmcs_demo.truth import TrueStateInterval
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
@@ -33,7 +33,7 @@ class Track(NamedTuple):
 def track(
     sample: IntArray,
     position: Array,
-    segments: Sequence[Segment],
+    segments: Sequence[TrueStateInterval],
     learned: Sequence[Path | None],
     hand: Array,
     stood: BoolArray | None = None,

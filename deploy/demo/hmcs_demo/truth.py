@@ -28,7 +28,7 @@ class RunError(Exception):
     """A run that cannot be measured, or did not come about; says why."""
 
 
-class Segment(NamedTuple):
+class TrueStateInterval(NamedTuple):
     """A stretch of the performance that truly is of one state."""
 
     state: int
@@ -96,11 +96,12 @@ class SampleClock:
         return float(np.interp(number, self._numbers, self._seconds))
 
     @property
-    def segments(self) -> tuple[Segment, ...]:
+    def segments(self) -> tuple[TrueStateInterval, ...]:
         """The true segments, one after the other; the last sample of one begins the next."""
         edges = [0, *(np.flatnonzero(np.diff(self.labels)) + 1).tolist(), len(self.labels) - 1]
         return tuple(
-            Segment(int(self.labels[begin]), begin, end) for begin, end in itertools.pairwise(edges)
+            TrueStateInterval(int(self.labels[begin]), begin, end)
+            for begin, end in itertools.pairwise(edges)
         )
 
 

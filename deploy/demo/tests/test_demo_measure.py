@@ -23,7 +23,7 @@ from hmcs_demo.recording import (
 )
 from hmcs_demo.summary import Summary
 from hmcs_demo.tracks import path_errors, recognized
-from hmcs_demo.truth import RunError, SampleClock, Segment
+from hmcs_demo.truth import RunError, SampleClock, TrueStateInterval
 
 Record = Callable[..., Recording]
 MS = 1_000_000
@@ -31,7 +31,7 @@ RATE_HZ = 100.0
 
 
 def test_true_segments_begin_where_the_labels_do(measured: Measured) -> None:
-    assert measured.segments == (Segment(0, 0, 200), Segment(1, 200, 400))
+    assert measured.segments == (TrueStateInterval(0, 0, 200), TrueStateInterval(1, 200, 400))
     assert measured.motion_s == pytest.approx(4.0, abs=1e-6)
 
 

@@ -82,12 +82,12 @@ def asked_of(
     PartlyAnsweredError where some have done it and others do not answer.
     """
     replies = ask_everybody(bus, verb, question, service, timeout_s).each
-    told = "; ".join(map(str, replies))
+    answers = "; ".join(map(str, replies))
     if any(reply.refused for reply in replies) or not any(reply.done for reply in replies):
-        raise NobodyAnswersError(told)
+        raise NobodyAnswersError(answers)
     if not all(reply.done for reply in replies):
-        raise PartlyAnsweredError(told)
-    return plain(replies[0].detail) if len(replies) == 1 else told
+        raise PartlyAnsweredError(answers)
+    return plain(replies[0].detail) if len(replies) == 1 else answers
 
 
 def stop_everybody(bus: Bus, timeout_s: float = 2.0) -> Replies:

@@ -138,8 +138,8 @@ class ControlServer:
                         return {"error": f"{request.stop!r} was not started here"}
                     return {"exit_code": self._stack.processes[request.stop].stop()}
         except Exception as error:  # of one request: the stack goes on
-            told = str(error) if isinstance(error, (UserError, OSError)) else repr(error)
-            return {"error": told}
+            message = str(error) if isinstance(error, (UserError, OSError)) else repr(error)
+            return {"error": message}
 
 
 class Control:

@@ -108,11 +108,11 @@ def active_model(bus: Bus) -> str:
             f"no fixture controller in cell {bus.settings.cell}: nothing follows a recognizer here"
         )
     if len(set(followed.values())) > 1:
-        told = ", ".join(
+        models = ", ".join(
             f"{fixture} {plain(model) or 'none'}" for fixture, model in sorted(followed.items())
         )
         raise DeployError(
-            f"fixture controllers follow different models ({told}): let all follow one first, by "
+            f"fixture controllers follow different models ({models}): let all follow one first, by "
             "`hmcs swap --activate MODEL`"
         )
     return next(iter(followed.values()))

@@ -28,7 +28,7 @@ from hmcs.recordings.stretches import (
 )
 from hmcs.shown import plain
 from hmcs.task import Task
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 
 _SET = re.compile(
     r"\s*(?P<begin>\d+(?:\.\d*)?|\.\d+)\s*[-–]\s*(?P<end>\d+(?:\.\d*)?|\.\d+)\s*=(?P<state>.*)"
@@ -86,7 +86,7 @@ def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingConten
         raise UserError(
             "\n".join(
                 f"{content.path}: {told(label, content.first_ns)}: "
-                f"{unknown(f'state of task {task.name}', label.state, known)}"
+                f"{unknown_name_message(f'state of task {task.name}', label.state, known)}"
                 for label in wrong
             )
         )

@@ -41,7 +41,7 @@ class Launcher:
         self._say = say
         self._clock = clock
         self._ended: dict[str, StackProcess] = {}
-        """By instance, the last one whose end was told."""
+        """By instance, the last one whose end was reported."""
         self._restarts: dict[str, int] = {}
         self._due_s: dict[str, float] = {}
         self._troubles: dict[str, str] = {}
@@ -81,7 +81,7 @@ class Launcher:
                     self.say("hmcs", f"{process.instance} writes much: its log is begun anew")
 
     def say(self, who: str, what: str) -> None:
-        """Say a line; where nobody can be told, a stack that moves a robot goes on nevertheless."""
+        """Print a line; a stack that moves a robot goes on where it cannot be printed."""
         with contextlib.suppress(OSError, ValueError):
             self._say(who, what)
 

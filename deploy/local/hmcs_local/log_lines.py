@@ -23,10 +23,10 @@ def readable(line: str) -> str:
     if not isinstance(event, dict) or "event" not in event:
         return plain(line, LONGEST)
     facts = "".join(f"  {name}={value}" for name, value in event.items() if name not in _HEAD)
-    told = [plain(f"{event.get('level', '')!s:7} {event['event']}{facts}", LONGEST)]
+    lines = [plain(f"{event.get('level', '')!s:7} {event['event']}{facts}", LONGEST)]
     if traceback := event.get("traceback"):
-        told += [
+        lines += [
             line[: len(line) - len(line.lstrip(" "))] + plain(line.lstrip(" "), LONGEST)
             for line in str(traceback).split("\n")
         ]
-    return "\n".join(told)
+    return "\n".join(lines)

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 
 @contextmanager
 def fits_shown(wanted: bool) -> Iterator[Callable[[int, int], None]]:
-    """Yield what is to be told how many of all fits are done."""
+    """Yield the callback that takes how many of all fits are done."""
     console = Console(stderr=True)
     with Progress(
         "choosing settings",

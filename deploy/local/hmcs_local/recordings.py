@@ -13,8 +13,8 @@ from rich.text import Text
 from hmcs.errors import UserError
 from hmcs.recordings.exporting import Format, export
 from hmcs.recordings.inspection import Inspection, inspected
+from hmcs.recordings.json_codec import readable_as
 from hmcs.recordings.labels import label_notes, labels_of
-from hmcs.recordings.plain import readable_as
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.shown import plain
 
@@ -28,8 +28,8 @@ def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
     inspection = inspected(content)
     problems = (*inspection.problems, *label_notes(content))
     if as_json:
-        told = json.dumps(_told(content, inspection, problems))
-        console.print(told, soft_wrap=True, highlight=False, markup=False)
+        line = json.dumps(_told(content, inspection, problems))
+        console.print(line, soft_wrap=True, highlight=False, markup=False)
         return not problems
     title = Text(f"{plain(file.name)}: {inspection.duration_s:.1f} s")
     table = Table(title=title, title_justify="left")

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from hmcs.fixtures.compliance.factor import FREE_FACTOR
-from hmcs.recordings.guiding import Guided
+from hmcs.recordings.fixture_replay import FixtureReplay
 from hmcs.recordings.replaying import Replay
 from hmcs.recordings.stretches import Stretch
 from hmcs_laboratory.figures.drawing import (
@@ -38,7 +38,7 @@ def draw_replay(
     path: Path,
     form: str,
     replay: Replay,
-    guided: Guided,
+    fixture_replay: FixtureReplay,
     labels: Sequence[Stretch],
     begun_ns: int,
 ) -> None:
@@ -54,8 +54,8 @@ def draw_replay(
         picture = new_picture(7.5)
         states, factor, speed = picture.subplots(3, 1, sharex=True, height_ratios=[1.1, 1.0, 1.0])
         _draw_states(states, replay, labels, seconds)
-        _draw_factor(factor, guided, seconds(tick.log_ns for tick in guided.ticks))
-        _draw_speed(speed, guided, seconds(tick.log_ns for tick in guided.ticks))
+        _draw_factor(factor, fixture_replay, seconds(tick.log_ns for tick in fixture_replay.ticks))
+        _draw_speed(speed, fixture_replay, seconds(tick.log_ns for tick in fixture_replay.ticks))
         speed.set_xlabel("time since the recording began, s")
         picture.savefig(path, format=form)
 
@@ -90,21 +90,23 @@ def _draw_states(ax: Axes, replay: Replay, labels: Sequence[Stretch], seconds: A
     )
 
 
-def _draw_factor(ax: Axes, guided: Guided, at_s: Floats) -> None:
-    recorded = [np.nan if tick.then is None else tick.then.factor for tick in guided.ticks]
-    _draw_both(ax, at_s, recorded, [tick.now.factor for tick in guided.ticks])
+def _draw_factor(ax: Axes, fixture_replay: FixtureReplay, at_s: Floats) -> None:
+    recorded = [np.nan if tick.then is None else tick.then.factor for tick in fixture_replay.ticks]
+    _draw_both(ax, at_s, recorded, [tick.now.factor for tick in fixture_replay.ticks])
     ax.axhline(FREE_FACTOR, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
     ax.text(1.005, FREE_FACTOR, "free", transform=ax.get_yaxis_transform(), va="center")
     ax.set_ylabel("factor k, 0.5 to 1")
     ax.set_title("How stiff the fixture is")
 
 
-def _draw_speed(ax: Axes, guided: Guided, at_s: Floats) -> None:
+def _draw_speed(ax: Axes, fixture_replay: FixtureReplay, at_s: Floats) -> None:
     def mm_s(velocity: Floats) -> float:
         return 1e3 * float(np.linalg.norm(velocity))
 
-    recorded = [np.nan if tick.then is None else mm_s(tick.then.velocity) for tick in guided.ticks]
-    _draw_both(ax, at_s, recorded, [mm_s(tick.now.velocity) for tick in guided.ticks])
+    recorded = [
+        np.nan if tick.then is None else mm_s(tick.then.velocity) for tick in fixture_replay.ticks
+    ]
+    _draw_both(ax, at_s, recorded, [mm_s(tick.now.velocity) for tick in fixture_replay.ticks])
     ax.set_ylabel("speed, mm/s")
     ax.set_title("Commanded speed of the robot")
 

@@ -26,7 +26,7 @@ from hmcs.recordings.comparing import (
     fixtures_compared,
     rows_of,
 )
-from hmcs.recordings.guiding import Guided, guided
+from hmcs.recordings.fixture_replay import FixtureReplay, replay_fixture
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
@@ -76,7 +76,7 @@ def replay_in_process(
             return lambda share: progress.update(task, completed=int(begin + (end - begin) * share))
 
         replay = replayed(content, chosen, percents(0, 50))
-        fixture = guided(content, replay, percents(50, 100))
+        fixture = replay_fixture(content, replay, percents(50, 100))
     if files.steps is not None:
         _write_steps(files.steps, replay, fixture)
     if files.picture is not None:
@@ -89,7 +89,7 @@ def replay_in_process(
     beliefs, fixtures = compared(replay), fixtures_compared(fixture)
     notes = [*_degraded(beliefs), *replay.notes, *fixture.notes]
     if as_json:
-        told = {
+        figures = {
             "model": chosen.name,
             "model_hash": chosen.hash,
             "recorded_model": replay.compared_with,
@@ -98,8 +98,8 @@ def replay_in_process(
             "notes": notes,
         }
         # JSON has no NaN.
-        told = {name: None if value != value else value for name, value in told.items()}
-        console.print(json.dumps(told), soft_wrap=True, highlight=False, markup=False)
+        figures = {name: None if value != value else value for name, value in figures.items()}
+        console.print(json.dumps(figures), soft_wrap=True, highlight=False, markup=False)
     else:
         console.print(_side_by_side(file.name, replay, beliefs, fixtures))
         for note in [*([OPEN_LOOP] if fixture.ticks else []), *notes]:
@@ -132,12 +132,12 @@ def _side_by_side(
     title: str, replay: Replay, beliefs: Comparison, fixtures: FixtureComparison
 ) -> Table:
     """What was and what is, a line a figure; no line for what there is nothing of."""
-    told = (
+    heading = (
         f"{title}: {beliefs.steps} steps in {replay.lasted_s:.1f} s; recorded "
         f"{replay.compared_with or 'nobody'}, replayed {replay.model.name}, "
         f"{beliefs.times_real:.0f} times as fast"
     )
-    table = Table(title=Text(plain(told)), title_justify="left")
+    table = Table(title=Text(plain(heading)), title_justify="left")
     table.add_column("", no_wrap=True)
     for name in ("recorded", "replayed", "side by side"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -192,7 +192,7 @@ def _fixture_rows(fixtures: FixtureComparison) -> Iterator[tuple[str, str, str, 
     )
 
 
-def _write_steps(target: Path, replay: Replay, fixture: Guided) -> None:
+def _write_steps(target: Path, replay: Replay, fixture: FixtureReplay) -> None:
     rows = rows_of(replay, fixture)
     first = next(rows)
     with (
@@ -207,7 +207,7 @@ def _write_steps(target: Path, replay: Replay, fixture: Guided) -> None:
 
 @contextmanager
 def _written(target: Path) -> Iterator[Path]:
-    """`written_whole`, and what keeps it from being written told as what it is."""
+    """`written_whole`, with an error that names the reason where it cannot be written."""
     try:
         with written_whole(target) as unfinished:
             yield unfinished

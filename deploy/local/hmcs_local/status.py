@@ -84,17 +84,17 @@ def remarks(now: Observation, before: Observation | None) -> list[str]:
 
     `before` is an earlier look: who spoke for a model then is named where nobody does now.
     """
-    told = []
+    found = []
     for fixture, model in _followed(now.sightings):
         if not now.speakers.get(model):
             went = before.speakers.get(model, ()) if before else ()
             gone = f": {', '.join(map(_name, went))} went while it was active" if went else ""
             running = ", ".join(now.speakers) or "none"
-            told.append(
+            found.append(
                 f"{_name(fixture)} follows {plain(model)}, but nobody runs it{gone} "
                 f"(models that are run: {running})"
             )
-    return told
+    return found
 
 
 def show_status(bus: Bus, console: Console, *, once: bool) -> bool:

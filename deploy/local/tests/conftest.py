@@ -98,7 +98,7 @@ def classifier(service: Callable[..., dict[str, Any]]) -> dict[str, Any]:
 
 
 class Fixture:
-    """A fixture controller that does what it is told, or refuses; `asked` is what it was."""
+    """A fixture controller that carries out requests, or refuses; `asked` holds them."""
 
     def __init__(self, active: str = "") -> None:
         self.active = active

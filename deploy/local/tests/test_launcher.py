@@ -29,7 +29,7 @@ class Told(list[str]):
 
 
 class Clock:
-    """A clock that goes when it is told to."""
+    """A clock that a test moves."""
 
     def __init__(self) -> None:
         self.now_s = 1e9

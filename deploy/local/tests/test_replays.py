@@ -1,4 +1,4 @@
-"""Recordings looked at, exported and replayed; what is wrong with them is told in one message."""
+"""Recordings looked at, exported and replayed; what is wrong with them is one message."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from hmcs.bus.wire import encode
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, save_model
-from hmcs.recordings.parts import Preface, Recording
-from hmcs.recordings.plain import BY_SCHEMA, fields_of
+from hmcs.recordings.file_rotation import Preface, Recording
+from hmcs.recordings.json_codec import BY_SCHEMA, fields_of
 from hmcs.task import Task
 from hmcs_local.commands.recordings import replay as replay_command
 from hmcs_local.replays import OPEN_LOOP

@@ -16,7 +16,7 @@ RUN_WITHIN_S = 2.0
 """A recognizer that is to be activated has so long to be run by some process."""
 _AGAIN_NS = 50_000_000
 
-Told = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 class Requesting:
@@ -27,7 +27,7 @@ class Requesting:
         self._seen = seen
         self._asking = asking
 
-    def request(self, question: Question, done: Told, failed: Told) -> None:
+    def request(self, question: Question, done: Notify, failed: Notify) -> None:
         """Have a process do something; tell in one line what came of it, or why it was not done.
 
         A recognizer that no process runs is not activated: the fixture would wait for its beliefs.
@@ -39,7 +39,7 @@ class Requesting:
             self._ask(question, done, failed)
 
     def _activate(
-        self, question: Question, model: str, done: Told, failed: Told, until_s: float
+        self, question: Question, model: str, done: Notify, failed: Notify, until_s: float
     ) -> None:
         if self._seen.runners.run(model, self._seen.members):
             self._ask(question, done, failed)
@@ -53,7 +53,7 @@ class Requesting:
             again = partial(self._activate, question, model, done, failed, until_s)
             self._bus.at(time.monotonic_ns() + _AGAIN_NS, again)
 
-    def _ask(self, question: Question, done: Told, failed: Told) -> None:
+    def _ask(self, question: Question, done: Notify, failed: Notify) -> None:
         member = first_of(question.service, self._seen.members)
         if member is None:
             failed(f"no {question.service} is there to {question.verb.name}: start one")

@@ -17,7 +17,7 @@ from hmcs.bus.messages import (
     Health,
     Label,
     Record,
-    RobotLooks,
+    RobotDescription,
     TrainingProgress,
 )
 from hmcs.bus.service import Service
@@ -88,7 +88,7 @@ class Console(Service):
             None if task is None else order_of(task), task is None or not _cued(task)
         )
         self._unwatched_until_s = 0.0
-        # A trainer finds a task by what the console was told, a file's path or a shipped name.
+        # A trainer finds a task by the console's setting, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
         self._view = View(known, task, taught, self, settings.lease_s, log)
@@ -256,21 +256,23 @@ class Console(Service):
         if member.service == "robot":
             self._asking.ask(LOOKS, member, Ask(), self._on_looks, timeout_s=5.0)
 
-    def _on_looks(self, answers: list[Answer[RobotLooks]]) -> None:
+    def _on_looks(self, answers: list[Answer[RobotDescription]]) -> None:
         for answer in answers[:1]:
-            self._seen.looks = answer.body
+            self._seen.robot_description = answer.body
 
     def _ask_health(self) -> None:
         if self.page.viewers:
             self._asking.ask(HEALTH, _EVERYBODY, Ask(), self._on_health, timeout_s=0.5)
 
     def _on_health(self, answers: list[Answer[Health]]) -> None:
-        told = {
+        reported = {
             Member(answer.envelope.source.service, answer.envelope.source.instance): answer.body
             for answer in answers
         }
         there = self._seen.members
-        self._seen.health = {member: health for member, health in told.items() if member in there}
+        self._seen.health = {
+            member: health for member, health in reported.items() if member in there
+        }
 
 
 def served(settings: ConsoleSettings) -> Served:

@@ -1,4 +1,4 @@
-"""What a console can be told."""
+"""Settings of the console."""
 
 from __future__ import annotations
 

@@ -78,8 +78,8 @@ class View:
     def _followed(self, picture: Picture) -> Model | None:
         """The model of the recognizer that is followed; what was trained just now is one, too."""
         if picture.training is not self._training:
-            self._training = told = picture.training
-            if told is not None and told.stage == "done" and told.path:
-                self._models.look_in(told.path)
+            self._training = training = picture.training
+            if training is not None and training.stage == "done" and training.path:
+                self._models.look_in(training.path)
         belief = picture.belief
         return self._models.find(picture.active, "" if belief is None else belief.model_hash)

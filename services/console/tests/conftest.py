@@ -133,7 +133,7 @@ class Cell:
         self._end = stack.enter_context(ExitStack())
         self._end.callback(self.service.close)
         self.service.start()
-        # A discovered subscriber is told by the match of any publisher on its key.
+        # The match of any publisher on its key shows a discovered subscriber.
         probes = (
             self.bus.publisher(Handle, self.bus.keys.handle),
             self.bus.publisher(Label, self.bus.keys.label),

@@ -26,10 +26,10 @@ from hmcs.bus.messages import (
 )
 from hmcs.errors import UserError
 from hmcs.recognition.model_file import load_model
-from hmcs_console.seeing.gathered import usable
 from hmcs_console.seeing.listening import wrong_with
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Seen
+from hmcs_console.seeing.step_evidence import usable
 from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.view import View
 from support.texts import EXAMPLE_OF

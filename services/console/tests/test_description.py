@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from hmcs.bus.messages import RobotLooks
+from hmcs.bus.messages import RobotDescription
 from hmcs_console.drawing.description import MOST_LINKS, DescriptionError, tidy
 from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.nodes import node, node_in
@@ -125,8 +125,8 @@ endsolid t
 OBJ = b"mtllib %s\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
 
 
-def looks(urdf: str, files: dict[str, bytes]) -> RobotLooks:
-    return RobotLooks(robot="r", urdf=urdf, joints=(), files=files)
+def robot_description(urdf: str, files: dict[str, bytes]) -> RobotDescription:
+    return RobotDescription(robot="r", urdf=urdf, joints=(), files=files)
 
 
 def picture(size: tuple[int, int], color: str = "red") -> bytes:
@@ -212,8 +212,10 @@ def test_a_mesh_is_no_file_but_one_that_came_along(tmp_path: Path) -> None:
     outside = tmp_path / "outside.stl"
     outside.write_bytes(TRIANGLE)
     for name in (str(outside), f"file://{outside}", "http://127.0.0.1:1/x.stl", "b.stl"):
-        assert load_robot(looks(mesh(name), {"a.stl": TRIANGLE})).scene.is_empty
-    assert len(load_robot(looks(mesh("a.stl"), {"a.stl": TRIANGLE})).scene.geometry) == 1
+        assert load_robot(robot_description(mesh(name), {"a.stl": TRIANGLE})).scene.is_empty
+    assert (
+        len(load_robot(robot_description(mesh("a.stl"), {"a.stl": TRIANGLE})).scene.geometry) == 1
+    )
 
 
 def test_a_mesh_reaches_nothing_beyond_what_came_with_it(tmp_path: Path) -> None:
@@ -225,11 +227,11 @@ def test_a_mesh_reaches_nothing_beyond_what_came_with_it(tmp_path: Path) -> None
             "a.mtl": f"newmtl m\nmap_Kd {reached}\n".encode(),
             "a.png": picture((2, 2)),
         }
-        (shape,) = load_robot(looks(mesh("a.obj"), files)).scene.geometry.values()
+        (shape,) = load_robot(robot_description(mesh("a.obj"), files)).scene.geometry.values()
         image = getattr(getattr(shape.visual, "material", None), "image", None)
         assert image is None or image.size == (2, 2)
     # One without an end would be read for ever.
-    endless = looks(mesh("a.obj"), {"a.obj": OBJ % b"/dev/zero"})
+    endless = robot_description(mesh("a.obj"), {"a.obj": OBJ % b"/dev/zero"})
     assert len(load_robot(endless).scene.geometry) == 1
 
 
@@ -239,7 +241,7 @@ def test_its_own_picture_is_on_a_mesh() -> None:
         "m/a.mtl": b"newmtl m\nmap_Kd a.png\n",
         "m/a.png": picture((2, 2)),
     }
-    (shape,) = load_robot(looks(mesh("m/a.obj"), files)).scene.geometry.values()
+    (shape,) = load_robot(robot_description(mesh("m/a.obj"), files)).scene.geometry.values()
     assert isinstance(shape, trimesh.Trimesh)
     assert shape.visual.material.image.size == (2, 2)
 
@@ -282,7 +284,7 @@ def test_a_robots_own_names_lead_nowhere_in_the_scene(monkeypatch: pytest.Monkey
         '<joint name="&lt;j&gt;" type="revolute"><parent link="../../x"/><child link="/handle"/>'
         "</joint>"
     )
-    DrawnRobot(server, load_robot(looks(urdf, {"../a b.obj": evil})), "/robot")
+    DrawnRobot(server, load_robot(robot_description(urdf, {"../a b.obj": evil})), "/robot")
     server.stop()
     assert len(named) >= 3
     assert all(name.split("/")[1] == "robot" and ".." not in name.split("/") for name in named)

@@ -13,7 +13,7 @@ import numpy as np
 import yourdfpy
 from numpy.testing import assert_allclose
 
-from hmcs.bus.messages import Motion, RobotLooks, RobotState
+from hmcs.bus.messages import Motion, RobotDescription, RobotState
 from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.robot_model import joints_of, load_robot, written
 from hmcs_console.seeing.seen import FORGOTTEN_S, Seen
@@ -38,10 +38,10 @@ endsolid t
 
 
 def test_a_robot_is_loaded_with_the_meshes_that_came_with_it() -> None:
-    looks = RobotLooks(
+    robot_description = RobotDescription(
         robot="arm", urdf=URDF, joints=("j1",), files={"package://arm/upper.stl": TRIANGLE}
     )
-    robot = load_robot(looks)
+    robot = load_robot(robot_description)
     assert len(robot.scene.geometry) == 1
 
 
@@ -85,7 +85,7 @@ def moving() -> yourdfpy.URDF:
         for number, (name, kind, axis, mimic) in enumerate(joints)
     )
     return load_robot(
-        RobotLooks(
+        RobotDescription(
             robot="arm", urdf=f'<robot name="arm">{links}{told}</robot>', joints=(), files={}
         )
     )
@@ -129,8 +129,8 @@ def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None
 
 
 def test_joints_are_told_by_their_names() -> None:
-    looks = RobotLooks(robot="arm", urdf=URDF, joints=("j1", "j2"), files={})
-    assert joints_of(looks, np.array([0.5, 0.7])) == {"j1": 0.5, "j2": 0.7}
+    robot_description = RobotDescription(robot="arm", urdf=URDF, joints=("j1", "j2"), files={})
+    assert joints_of(robot_description, np.array([0.5, 0.7])) == {"j1": 0.5, "j2": 0.7}
 
 
 # --- what is kept ---------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from hmcs.bus.messages import (
     Message,
     Outline,
     Refusal,
-    RobotLooks,
+    RobotDescription,
     RobotState,
     TrainingProgress,
 )
@@ -123,7 +123,7 @@ KEPT: Mapping[type[Message], Keep] = {
     Health: keep_health,
     Done: keep_done,
     Refusal: set_to("answer", lambda body: f"robot refused: {body.reason}"),
-    RobotLooks: set_to("looks"),
+    RobotDescription: set_to("looks"),
     Outline: keep_take,
     Label: set_to("marking", lambda body: Marking(Order("a", {}), True, body.state)),
 }

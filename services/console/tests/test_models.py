@@ -104,7 +104,7 @@ def test_whoever_tells_of_ever_new_models_has_no_file_read_more_often(
         assert models.find("lines", f"hash {number}") is None
         now_s[0] += 0.01
     assert read.count(model_file) == pytest.approx(10.0 / READ_EVERY_S, abs=1)
-    assert len(models._told) == MOST_TOLD
+    assert len(models._named_files) == MOST_TOLD
     assert len(models._missed) <= MOST_MISSED
 
 
@@ -114,5 +114,5 @@ def test_whoever_tells_of_ever_new_models_has_no_file_read_more_often(
 def test_a_path_that_is_told_and_is_none_of_a_model_file_is_not_looked_at(path: str) -> None:
     models = Models((), (), LOG)
     models.look_in(path)
-    assert not models._told
+    assert not models._named_files
     assert models.find("lines", "hash") is None

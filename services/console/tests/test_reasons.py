@@ -11,7 +11,13 @@ from numpy.testing import assert_allclose
 from hmcs.bus.messages import Belief, Evidence, FixtureState
 from hmcs.motion.paths import Path
 from hmcs.task import Task
-from hmcs_console.seeing.gathered import STEPS, Gathered, beneath, gathered, usable
+from hmcs_console.seeing.step_evidence import (
+    STEPS,
+    StepEvidence,
+    evidence_of,
+    usable,
+    with_evidence,
+)
 from hmcs_console.telling import spoken_reasons
 from hmcs_console.telling.reasons import MOST_RIVALS, Reasons, log_ratio, reasons_of, turn
 from support.lessons import lesson_task
@@ -214,22 +220,22 @@ def test_evidence_whose_arrays_do_not_fit_is_not_usable() -> None:
 
 
 def test_evidence_of_a_step_is_put_together_and_found_by_the_belief_it_is_for() -> None:
-    known = Gathered()
+    known = StepEvidence()
     one, other = evidence({"reach": {}}), evidence({"turn": {}})
     for each in (one, evidence({"lift": {}}, step=42), other, evidence({"lift": {}}, clock="d")):
-        known = gathered(known, each)
-    found = beneath(belief(1.0, 0.0, 0.0, 0.0), known)
+        known = with_evidence(known, each)
+    found = evidence_of(belief(1.0, 0.0, 0.0, 0.0), known)
     assert [each.gestemes for each in found] == [("reach",), ("turn",)]
-    assert beneath(belief(1.0, 0.0, 0.0, 0.0, model_hash="another"), known) == ()
+    assert evidence_of(belief(1.0, 0.0, 0.0, 0.0, model_hash="another"), known) == ()
 
 
 def test_evidence_of_the_newest_steps_only_is_kept() -> None:
-    known = Gathered()
+    known = StepEvidence()
     for step in range(100):
-        known = gathered(known, evidence({"reach": {}}, step=step))
-    assert len(known.told) == STEPS
-    assert beneath(belief(1.0, 0.0, 0.0, 0.0, step=99), known)
-    assert not beneath(belief(1.0, 0.0, 0.0, 0.0, step=99 - STEPS), known)
+        known = with_evidence(known, evidence({"reach": {}}, step=step))
+    assert len(known.by_step) == STEPS
+    assert evidence_of(belief(1.0, 0.0, 0.0, 0.0, step=99), known)
+    assert not evidence_of(belief(1.0, 0.0, 0.0, 0.0, step=99 - STEPS), known)
 
 
 # --- in words -------------------------------------------------------------------------------------

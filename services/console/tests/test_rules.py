@@ -1,4 +1,4 @@
-"""A handle in a plane, and scaled: what is told follows from where it was taken."""
+"""A handle in a plane, and scaled: what it sends follows from where it was grabbed."""
 
 from __future__ import annotations
 

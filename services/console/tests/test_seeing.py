@@ -28,7 +28,7 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.task import load_task, shipped_tasks
 from hmcs_console.drawing.drawn_guides import DrawnGuides
-from hmcs_console.seeing.glancing import Told, told_in
+from hmcs_console.seeing.glancing import MessageHeader, header_of
 from hmcs_console.seeing.seen import Picture, Seen
 from hmcs_console.serving.server import Server
 from hmcs_console.telling import spoken_rules
@@ -179,13 +179,15 @@ def test_sender_and_cause_are_read_without_the_rest() -> None:
         source=Source(service="robot", instance="r", boot="boot"), seq=3, origin=ORIGIN
     )
     step = Step(index=0, position=np.zeros(3), displacement=np.ones(3))
-    assert told_in(encode(step, envelope)) == Told("boot", ("device", 7))
-    assert told_in(encode(step, envelope.model_copy(update={"origin": None}))) == Told("boot", None)
+    assert header_of(encode(step, envelope)) == MessageHeader("boot", ("device", 7))
+    assert header_of(encode(step, envelope.model_copy(update={"origin": None}))) == MessageHeader(
+        "boot", None
+    )
 
 
 @pytest.mark.parametrize("payload", [b"", b"\xc1", b"\x93\x01\x02\x03", b"\x81\xa6origin\xc0"])
 def test_what_is_no_message_has_neither(payload: bytes) -> None:
-    assert told_in(payload) == Told("", None)
+    assert header_of(payload) == MessageHeader("", None)
 
 
 def test_every_message_counts_and_the_newest_is_kept(make_cell: MakeCell) -> None:

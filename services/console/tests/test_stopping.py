@@ -38,7 +38,7 @@ def robot(make_process: MakeProcess, cell: Any, name: str, stop: Callable[[Ask],
 
 
 def stop_until(cell: Any, told: Callable[[str], bool]) -> None:
-    """Stop again and again, as one would until everybody is there, and has told."""
+    """Stop again and again, as one would until everybody is there, and has answered."""
 
     def stopped() -> bool:
         cell.service.stop()

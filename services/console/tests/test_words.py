@@ -144,7 +144,7 @@ def test_services_tell_how_they_are_and_what_was_lost_late_and_refused() -> None
     )
     robot_a, task_hmm_b, trainer_c = said.split("\n\n")
     assert robot_a == "**robot** a, 100 Hz  \nruns  \nlost 3, late 0, refused 4"
-    assert "has not told" in task_hmm_b
+    assert "has not reported" in task_hmm_b
     assert "**unhealthy**: stuck" in trainer_c
     assert words.services({}) == "Nobody is there."
 

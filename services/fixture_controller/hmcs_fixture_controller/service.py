@@ -306,16 +306,16 @@ class FixtureController(Service):
 
     def _take_over(self, model: Model, guides: Guides) -> str:
         followed = self._recognizers.get(self._controller.active)
-        told = self._adopt(model, guides)
+        outcome = self._adopt(model, guides)
         if followed is None or followed.model.task.name == model.task.name:
-            return told
+            return outcome
         before = followed.model.task.name
         self.log.warning(
             "a model of another task",
             extra={"model": model.name, "task": model.task.name, "followed": before},
         )
         return (
-            f"{told}; mind that it is of task {model.task.name!r}, the followed one of "
+            f"{outcome}; mind that it is of task {model.task.name!r}, the followed one of "
             f"{before!r}: its guides and limits are those of its own task"
         )
 

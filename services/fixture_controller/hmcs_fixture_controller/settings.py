@@ -1,4 +1,4 @@
-"""What a fixture controller can be told."""
+"""Settings of the fixture controller."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class GestemeClassifier(Service):
         self._peers_key = bus.keys.member(self._model.name, self.name)
         self._peers = {bus.source.instance}
         self._living = {bus.source.instance}
-        """Peers whose tokens the watch has told of, and not yet that they went."""
+        """Peers whose tokens the watch has reported, and not yet that they went."""
         # One more than is scored: how the hand turns in a step follows from the step before it.
         memory_steps = segment_filter_model(self._model).scoring.window_steps + 1
         self._bank = bank_of(self._model, [])
@@ -88,8 +88,8 @@ class GestemeClassifier(Service):
         self._recent.append(fed)
         evidence = self._bank.step(step_of(fed.step))
         if self._ready:
-            told = evidence_message(self._model, evidence, fed.clock, self.settings.precision)
-            self._evidence.put(told, fed.origin)
+            message = evidence_message(self._model, evidence, fed.clock, self.settings.precision)
+            self._evidence.put(message, fed.origin)
 
     def _on_restart(self, index: int) -> None:
         self._recent.clear()

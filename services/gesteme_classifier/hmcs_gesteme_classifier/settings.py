@@ -11,7 +11,7 @@ from hmcs.bus.settings import ServiceSettings
 
 
 class GestemeClassifierSettings(ServiceSettings):
-    """What a gesteme classifier can be told."""
+    """Settings of a gesteme classifier."""
 
     model: Path
     """The model file."""

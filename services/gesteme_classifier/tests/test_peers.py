@@ -44,8 +44,8 @@ def eight_gestemes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         }
     )
     one = line_model(MODEL, task, np.array([[0.0, 0, 0], [0.5, 0, 0]]))
-    layers = one.knowledge
-    parameters = layers.parameters
+    knowledge = one.knowledge
+    parameters = knowledge.parameters
     repeated = {
         name: np.repeat(value, len(GESTEMES), axis=0)
         for name, value in parameters._asdict().items()
@@ -56,7 +56,7 @@ def eight_gestemes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         variances=np.repeat(parameters.senses.variances, len(GESTEMES), axis=0),
     )
     model = one._replace(
-        knowledge=layers._replace(parameters=parameters._replace(**repeated, senses=senses)),
+        knowledge=knowledge._replace(parameters=parameters._replace(**repeated, senses=senses)),
         path_points=one.path_points * len(GESTEMES),
         path_spreads=one.path_spreads * len(GESTEMES),
     )

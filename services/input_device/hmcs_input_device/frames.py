@@ -28,7 +28,7 @@ class TaskFrame:
         self._rotation = rotation_matrix(self._orientation)
 
     def in_base(self, sample: DeviceSample) -> DeviceSample:
-        """Return a sample, told in the operator's frame, along the axes of the robot's base."""
+        """Return a sample, given in the operator's frame, along the axes of the robot's base."""
         return sample._replace(
             position=self._rotation @ sample.position,
             velocity=self._rotation @ sample.velocity,

@@ -49,8 +49,8 @@ class Guarded:
         self._plays = plays(source)
         self._gate = PressGate("the dead-man's switch", minds_hangs=not self._plays)
         self._hand: DeviceSample | None = None
-        self._told: DeviceSample | None = None
-        self._told_s = self._same_since_s = -float("inf")
+        self._last_sample: DeviceSample | None = None
+        self._last_sample_s = self._same_since_s = -float("inf")
         self._fault = ""
         self.refusal = ""
         """Why the last sample was refused as malformed or impossible; empty where it was not."""
@@ -68,7 +68,7 @@ class Guarded:
         # Whatever a device of another distribution raises, the hand rests and the service goes on.
         self._fault = self.refusal = ""
         try:
-            told = self._checked(now_s, self._source.sample(elapsed_s))
+            checked = self._checked(now_s, self._source.sample(elapsed_s))
         except _SilentError as error:
             self._fault = f"{self._name}: {error}"
         except _NoSampleError as error:
@@ -82,53 +82,53 @@ class Guarded:
             return self._hand
         if elapsed_s is None:
             self._gate.shut("it was held before it was to play")
-        elif self._gate.passes(now_s, told.dead_man, self._reported()):
-            self._hand = told
-            return told
-        self._hand = released(told)
+        elif self._gate.passes(now_s, checked.dead_man, self._reported()):
+            self._hand = checked
+            return checked
+        self._hand = released(checked)
         return self._hand
 
     def _reported(self) -> str:
         return self._source.trouble if isinstance(self._source, Troubled) else ""
 
-    def _checked(self, now_s: float, told: DeviceSample | None) -> DeviceSample:
+    def _checked(self, now_s: float, sample: DeviceSample | None) -> DeviceSample:
         """Return a copy of a sample; raises _NoSampleError or _SilentError for an unusable one."""
-        if told is None:
+        if sample is None:
             raise _SilentError("gives no samples: check the device")
         try:
-            motion = Motion(**told._asdict())
+            motion = Motion(**sample._asdict())
         except ValidationError as error:
             where, why = first_problem(error)
             raise _NoSampleError(f"gives malformed samples: {where}: {why}") from None
         if not np.abs(motion.position).max() <= FARTHEST_M:
             raise _NoSampleError(f"its hand is farther than {FARTHEST_M:g} m: check its scale")
         # A device may reuse its arrays.
-        told = deepcopy(told)
+        sample = deepcopy(sample)
         if not self._plays:
-            self._doubt(now_s, told)
-        return told
+            self._doubt(now_s, sample)
+        return sample
 
-    def _doubt(self, now_s: float, told: DeviceSample) -> None:
+    def _doubt(self, now_s: float, sample: DeviceSample) -> None:
         """Raise where no hand does this, or where the sample is old."""
-        before, before_s = self._told, self._told_s
-        self._told, self._told_s = told, now_s
-        if told.age_s is not None and not 0.0 <= told.age_s <= SILENT_S:
+        before, before_s = self._last_sample, self._last_sample_s
+        self._last_sample, self._last_sample_s = sample, now_s
+        if sample.age_s is not None and not 0.0 <= sample.age_s <= SILENT_S:
             raise _SilentError("is silent: check the device")
         for what, vector, largest, unit in (
-            ("moves", told.velocity, FASTEST_M_S, "m/s"),
-            ("turns", told.angular_velocity, FASTEST_RAD_S, "rad/s"),
-            ("pushes", told.wrench, LARGEST_WRENCH, "N"),
+            ("moves", sample.velocity, FASTEST_M_S, "m/s"),
+            ("turns", sample.angular_velocity, FASTEST_RAD_S, "rad/s"),
+            ("pushes", sample.wrench, LARGEST_WRENCH, "N"),
         ):
             if vector is not None and np.linalg.norm(vector) > largest:
                 raise _NoSampleError(f"{what} with more than {largest:g} {unit}: check the device")
-        if before is None or _differ(before, told) or not (told.dead_man and _works(told)):
+        if before is None or _differ(before, sample) or not (sample.dead_man and _works(sample)):
             self._same_since_s = now_s
         if now_s - self._same_since_s > FROZEN_S:
             raise _SilentError("repeats the very same motion: check the device")
-        if before is None or not (self._gate.open and told.dead_man):
+        if before is None or not (self._gate.open and sample.dead_man):
             return
-        way_m = float(np.linalg.norm(np.subtract(told.position, before.position)))
-        held = not (before.clutch or told.clutch)
+        way_m = float(np.linalg.norm(np.subtract(sample.position, before.position)))
+        held = not (before.clutch or sample.clutch)
         if held and way_m > FASTEST_M_S * (now_s - before_s) + JUMP_M:
             raise _NoSampleError(f"jumped by {way_m:.3g} m: check the device")
 
@@ -141,9 +141,9 @@ class _SilentError(Exception):
     """A source has nothing new to tell."""
 
 
-def _works(told: DeviceSample) -> bool:
-    pushes = told.wrench is not None and np.linalg.norm(told.wrench) > STILL_N
-    return bool(pushes or np.linalg.norm(told.velocity) > STILL_M_S)
+def _works(sample: DeviceSample) -> bool:
+    pushes = sample.wrench is not None and np.linalg.norm(sample.wrench) > STILL_N
+    return bool(pushes or np.linalg.norm(sample.velocity) > STILL_M_S)
 
 
 def _differ(one: DeviceSample, other: DeviceSample) -> bool:

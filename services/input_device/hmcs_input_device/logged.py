@@ -38,7 +38,7 @@ class Logged:
         self.reach_m = float(np.linalg.norm(positions - positions[0], axis=1).max())
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
-        """Return the device `elapsed_s` after it was told to play."""
+        """Return the device `elapsed_s` after the request to play."""
         if elapsed_s is None or elapsed_s < self._lead_in_s:
             return DeviceSample(self._motions[0].position, np.zeros(3), dead_man=False)
         if elapsed_s > self.duration_s:

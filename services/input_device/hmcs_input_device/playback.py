@@ -79,7 +79,7 @@ class Playback:
         return float(np.linalg.norm(self._positions - self._positions[0], axis=1).max())
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
-        """Return the device `elapsed_s` after it was told to play."""
+        """Return the device `elapsed_s` after the request to play."""
         if elapsed_s is None or elapsed_s < 0:
             return self._at_rest(0)
         if elapsed_s > self.duration_s:

@@ -11,7 +11,7 @@ from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.closed_loop_operators import PRESETS, ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration, read_csv
-from hmcs.motion.leading import leading_hand
+from hmcs.motion.hand_guiding import hand_guiding_of
 from hmcs.motion.operators import Operator, OperatorStuckError, TaskSegment, joined, perform
 from hmcs.motion.paths import Path
 from hmcs.motion.references import References, random_gesteme, random_performance
@@ -100,7 +100,7 @@ def simulated(settings: InputDeviceSettings, task: Task) -> Simulated:
         lead_in_s=settings.lead_in_s,
         reach_m=float(np.linalg.norm(meant - meant[0], axis=1).max()),
         reaction=Reaction(settings.reaction_s) if settings.re_engage else None,
-        leading=leading_hand(task),
+        hand_guiding=hand_guiding_of(task),
     )
 
 

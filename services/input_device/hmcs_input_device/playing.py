@@ -43,7 +43,7 @@ class Playing:
 
     @property
     def begun(self) -> bool:
-        """Whether it was told to play."""
+        """Whether play was requested."""
         return self._began_s is not None
 
     @property

@@ -14,7 +14,7 @@ from hmcs_input_device.sources import DeviceSample
 RELEASED_S = 0.5
 """How long the dead-man is let go; longer than fixture and robot ignore samples after a stall."""
 HEARD_WITHIN_S = 0.5
-"""A robot that has told nothing for longer is not there."""
+"""A robot that has sent nothing for longer is not there."""
 HANG_S = 0.1
 """A longer time between two samples is a hang of this process; the others stop on it."""
 
@@ -53,7 +53,7 @@ class Reaction:
         self._robot_told_s, self._robot_follows = now_s, follows
 
     def fixture_told(self, *, engaged: bool) -> None:
-        """Take in whether the fixture lets the operator drive; until told otherwise it does."""
+        """Note whether the fixture lets the operator drive; it does until this is called."""
         self._fixture_engaged = engaged
 
     def lets_go(self, now_s: float, *, pressing: bool) -> bool:
@@ -109,7 +109,7 @@ class ReEngaging:
         return self._playback.reach_m
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
-        """Return the device `elapsed_s` after it was told to play, the waiting included."""
+        """Return the device `elapsed_s` after the request to play, the waiting included."""
         if elapsed_s is None:
             return self._playback.sample(None)
         if self._seen_s is None or elapsed_s < self._seen_s:

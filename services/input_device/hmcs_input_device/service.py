@@ -254,7 +254,7 @@ class InputDevice(Service):
         if elapsed_s is None:
             if self._may_play:
                 return f"waiting for {', '.join(self._missing()) or 'its first sample'}"
-            return "waiting to be told to play"
+            return "waiting for a request to play"
         return "finished" if elapsed_s > self._source.duration_s else "playing"
 
     def _no_step_possible(self) -> str:

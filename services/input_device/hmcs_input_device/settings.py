@@ -1,4 +1,4 @@
-"""What the input device can be told."""
+"""Settings of the input device."""
 
 from __future__ import annotations
 

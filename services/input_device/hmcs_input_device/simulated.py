@@ -6,7 +6,7 @@ import numpy as np
 
 from hmcs.arrays import Array
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
-from hmcs.motion.leading import LeadingHand
+from hmcs.motion.hand_guiding import HandGuiding
 from hmcs_input_device.reaction import HEARD_WITHIN_S, Reaction
 from hmcs_input_device.sources import LIVE, DeviceSample
 
@@ -31,19 +31,19 @@ class Simulated:
         lead_in_s: float,
         reach_m: float,
         reaction: Reaction | None = None,
-        leading: LeadingHand | None = None,
+        hand_guiding: HandGuiding | None = None,
     ) -> None:
         """Be asked `rate_hz` times a second, and rest for `lead_in_s` before the hand moves.
 
-        With `leading` the hand is where the tool is, and its velocity is the one its force asks
-        for.
+        With `hand_guiding` the hand is where the tool is, and its velocity is the one its force
+        asks for.
         """
         self._operator = operator
         self._lead_in_s = lead_in_s
         self._robot: tuple[Array, Array] | None = None
         self._seen_anew = False
         self._seen_s = 0.0
-        self._leading = leading
+        self._hand_guiding = hand_guiding
         self._hand = np.zeros(3)
         self._made = 0
         self._ended_s: float | None = None
@@ -59,11 +59,11 @@ class Simulated:
     def sees(self, position: Array, orientation: Array) -> None:
         """Take in the robot's tool, base frame: position, m, (3,), and how it is turned, (4,)."""
         self._robot, self._seen_anew = (position, orientation), True
-        if self._leading is not None:
+        if self._hand_guiding is not None:
             self._hand = position
 
     def sample(self, elapsed_s: float | None) -> DeviceSample:
-        """Return the hand `elapsed_s` after it was told to begin; one period of motion a call."""
+        """Return the hand `elapsed_s` after the request to begin; one period of motion a call."""
         resting = DeviceSample(self._hand, np.zeros(3), dead_man=False)
         if elapsed_s is None or elapsed_s < self._lead_in_s or self._ended_s is not None:
             return resting
@@ -87,10 +87,10 @@ class Simulated:
                 self._ended_s = elapsed_s
                 return resting
             velocity = motion.velocity
-            if self._leading is None:
+            if self._hand_guiding is None:
                 self._hand = self._hand + velocity / self.rate_hz
             else:
-                led = self._leading.push(velocity, orientation, 1.0 / self.rate_hz)
+                led = self._hand_guiding.push(velocity, orientation, 1.0 / self.rate_hz)
                 velocity, wrench = led.twist[:3], led.wrench
         return DeviceSample(self._hand, velocity, dead_man=True, wrench=wrench)
 

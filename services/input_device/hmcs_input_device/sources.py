@@ -90,7 +90,7 @@ class Source(Protocol):
     def sample(self, elapsed_s: float | None) -> DeviceSample | None:
         """Return the device as it is now; None where it has nothing to say: the hand then rests.
 
-        `elapsed_s` counts from the moment it was told to play; None before. It must not wait.
+        `elapsed_s` counts from the request to play; None before. It must not wait.
         """
 
     def close(self) -> None:

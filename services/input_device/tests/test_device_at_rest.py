@@ -10,7 +10,7 @@ from support.devices import PERIOD_S, Desk
 
 
 def assert_stays(desk: Desk, *axes: float, seconds: float = 0.9) -> None:
-    """The hand does not move while the dead-man is held: less long than silence is told of."""
+    """The hand does not move while the dead-man is held: shorter than a reported silence."""
     here = desk.source.sample(desk.now_s).position
     still = desk.tell(*axes, press="hold", times=round(seconds / PERIOD_S))
     assert not still.dead_man

@@ -20,7 +20,7 @@ ZERO = np.zeros(3)
 
 
 class Arm:
-    """A device that says what it is told to."""
+    """A device whose samples a test sets."""
 
     rate_hz, duration_s, reach_m = 100.0, LIVE, None
 

@@ -125,7 +125,7 @@ def test_reach_is_how_far_it_goes_and_not_how_long_it_is() -> None:
 
 TURN = 1.5 * TIME_S
 FELT = CURVE._replace(
-    # Every second quaternion is told with the other sign, as some devices do.
+    # Every second quaternion has the other sign, as some devices send it.
     orientations=np.stack([0 * TURN, np.sin(TURN / 2), 0 * TURN, np.cos(TURN / 2)], axis=1)
     * np.where(np.arange(len(TURN)) % 2, -1.0, 1.0)[:, None],
     wrenches=np.outer(TIME_S, np.arange(1.0, 7.0)),

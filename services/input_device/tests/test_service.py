@@ -77,7 +77,7 @@ def test_it_rests_until_it_is_told_to_play_and_plays_as_often_as_told(play: Make
     desk = play(autoplay=False)
     desk.until(lambda: len(desk.motions) > 20, "samples at rest")
     assert not any(received.body.dead_man for received in desk.motions)
-    assert desk.service.health() == (True, "waiting to be told to play")
+    assert desk.service.health() == (True, "waiting for a request to play")
     assert isinstance(desk.ask("play", Ask(), Done), Done)
     desk.until_finished()
     once = len(desk.steps)

@@ -33,7 +33,7 @@ class Robot:
         self.may_follow = False
 
     def ask_to_stop(self) -> None:
-        """As `hmcs stop` does; it is told for half a second, or until it moves again."""
+        """As `hmcs stop` does; reported for half a second, or until it moves again."""
         self.may_follow = False
         self.asked_until_s = time.monotonic() + 0.5
 

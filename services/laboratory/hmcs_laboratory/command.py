@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 from hmcs_laboratory.report import as_json, as_table, progress_shown, studies_table
 from hmcs_laboratory.running import measure
 from hmcs_laboratory.studies import STUDIES
@@ -28,7 +28,7 @@ def find_study(name: str) -> Study[StudySettings]:
     for study in STUDIES:
         if study.name == name:
             return study
-    raise UserError(unknown("study", name, [study.name for study in STUDIES]))
+    raise UserError(unknown_name_message("study", name, [study.name for study in STUDIES]))
 
 
 def list_studies() -> int:
@@ -61,7 +61,7 @@ def run_study(
         raise UserError(f"--picture: study {name!r} has none; those that have: {drawn}")
     console = Console(stderr=True)
     try:
-        with progress_shown(console, name, trials or study.trials) as told:
+        with progress_shown(console, name, trials or study.trials) as report_progress:
             result = measure(
                 study,
                 settings,
@@ -69,7 +69,7 @@ def run_study(
                 trials=trials,
                 workers=workers,
                 cluster=cluster,
-                progress=told,
+                progress=report_progress,
             )
     except KeyboardInterrupt:
         console.print(f"{name}: interrupted")
@@ -106,9 +106,14 @@ def run_figures(
 
     console = Console(stderr=True)
     try:
-        with figures_shown(console) as told:
+        with figures_shown(console) as report_progress:
             made = make_figures(
-                folder, numbers=numbers, fast=fast, seed=seed, workers=workers, progress=told
+                folder,
+                numbers=numbers,
+                fast=fast,
+                seed=seed,
+                workers=workers,
+                progress=report_progress,
             )
     except KeyboardInterrupt:
         console.print("figures: interrupted")

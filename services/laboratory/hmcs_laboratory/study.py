@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 
 Scalar = str | int | float
 
@@ -66,7 +66,7 @@ class Study(Generic[Settings]):
     trial: Callable[[Settings, np.random.Generator], Sequence[Measured]]
     """Measures every method at every setting once, with random numbers from the generator only."""
     trials: int = 10
-    """How many are made unless told otherwise."""
+    """How many are made by default."""
     tiny: Mapping[str, str] = field(default_factory=dict)
     """Settings with which a trial takes a second or so."""
     table: tuple[str, ...] = ()
@@ -87,7 +87,8 @@ class Study(Generic[Settings]):
                 raise UserError(f"--set {assignment}: write NAME=VALUE, e.g. --set noise=0.3")
             if name not in self.settings.model_fields:
                 raise UserError(
-                    f"study {self.name!r}: " + unknown("setting", name, self.settings.model_fields)
+                    f"study {self.name!r}: "
+                    + unknown_name_message("setting", name, self.settings.model_fields)
                 )
             given[name] = value
         try:
@@ -107,7 +108,7 @@ def known_once(what: str, names: tuple[str, ...], known: Sequence[str]) -> tuple
     """Return names that are all known and stand once; raises ValueError otherwise."""
     for name in names:
         if name not in known:
-            raise ValueError(unknown(what, name, known))
+            raise ValueError(unknown_name_message(what, name, known))
     if len(set(names)) < len(names):
         raise ValueError(f"{', '.join(names)}: expected every {what} once")
     return names

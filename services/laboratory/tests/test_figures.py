@@ -1,4 +1,4 @@
-"""The figures: all of the issue's list, drawn, told by what they show, and the same for a seed."""
+"""The figures: all of the issue's list, drawn, described by numbers, and the same for a seed."""
 
 import json
 from dataclasses import replace

@@ -62,6 +62,6 @@ class Hosted:
         if self._ready:
             self.believed += 1
             if recognition.evidence is not None:
-                told = evidence_message(self.model, recognition.evidence, fed.clock, "float64")
-                self._evidence.put(told, fed.origin)
+                message = evidence_message(self.model, recognition.evidence, fed.clock, "float64")
+                self._evidence.put(message, fed.origin)
             self._belief.put(belief_message(self.model, recognition, fed.clock), fed.origin)

@@ -11,7 +11,7 @@ from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
 
 
 class RecognizerSettings(ServiceSettings):
-    """What a recognizer in one process can be told."""
+    """Settings of a recognizer in one process."""
 
     model: Annotated[Path | None, EMPTY_IS_NONE] = None
     """The model file to begin with; the kind of recognizer stands in it. Without one it waits to be

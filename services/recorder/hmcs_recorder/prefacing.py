@@ -13,7 +13,7 @@ from typing import TypeVar
 from hmcs.bus.messages import Ask, Message
 from hmcs.bus.session import Answer, Bus, StoppedError
 from hmcs.bus.verbs import DESCRIBE, SETTINGS, Verb
-from hmcs.recordings.parts import Preface, as_fields
+from hmcs.recordings.file_rotation import Preface, as_fields
 from hmcs.recordings.reading import LARGEST_ATTACHMENT_BYTES
 
 Q = TypeVar("Q", bound=Message)

@@ -6,10 +6,10 @@ import logging
 import time
 from collections.abc import Iterator
 
-from hmcs.bus.messages import Ask, RobotLooks
+from hmcs.bus.messages import Ask, RobotDescription
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import LOOKS
-from hmcs.recordings.parts import Preface, Recording
+from hmcs.recordings.file_rotation import Preface, Recording
 from hmcs_recorder.prefacing import ask_all
 
 JOINTS = "joints/"
@@ -25,7 +25,7 @@ class Robots:
 
     def __init__(self, bus: Bus, log: logging.Logger) -> None:
         self._bus, self._log = bus, log
-        self._looks: dict[str, RobotLooks] = {}
+        self._robot_descriptions: dict[str, RobotDescription] = {}
         self._asked: dict[str, int] = {}
         """How often each was asked in vain."""
         self._again_s = 0.0
@@ -33,16 +33,16 @@ class Robots:
     def ask(self) -> None:
         """Ask all that are there."""
         for answer in ask_all(self._bus, LOOKS, Ask()):
-            self._looks[answer.body.robot] = answer.body
+            self._robot_descriptions[answer.body.robot] = answer.body
 
     def kept(self) -> Iterator[Preface]:
         """Yield what is kept of each: its description, and its joints' names in their order.
 
         Of one that gives no answer, that it does not.
         """
-        yield from map(_kept, self._looks.values())
+        yield from map(_kept, self._robot_descriptions.values())
         for robot, times in self._asked.items():
-            if times == MOST_ASKED and robot not in self._looks:
+            if times == MOST_ASKED and robot not in self._robot_descriptions:
                 yield _unknown(robot)
 
     def name_joints(self, recording: Recording, now_ns: int) -> None:
@@ -52,11 +52,11 @@ class Robots:
         recording and in the log. Raises OSError as writing does.
         """
         undescribed = recording.undescribed
-        for robot in undescribed & self._looks.keys():
-            recording.name_joints(robot, self._looks[robot].joints)
+        for robot in undescribed & self._robot_descriptions.keys():
+            recording.name_joints(robot, self._robot_descriptions[robot].joints)
         waiting = {
             robot
-            for robot in undescribed - self._looks.keys()
+            for robot in undescribed - self._robot_descriptions.keys()
             if self._asked.get(robot, 0) < MOST_ASKED
         }
         if not waiting or time.monotonic() < self._again_s:
@@ -64,10 +64,10 @@ class Robots:
         self._again_s = time.monotonic() + RETRY_S
         self.ask()
         for robot in waiting:
-            looks = self._looks.get(robot)
-            if looks is not None:
-                recording.add(_kept(looks), now_ns)
-                recording.name_joints(robot, looks.joints)
+            robot_description = self._robot_descriptions.get(robot)
+            if robot_description is not None:
+                recording.add(_kept(robot_description), now_ns)
+                recording.name_joints(robot, robot_description.joints)
                 continue
             self._asked[robot] = self._asked.get(robot, 0) + 1
             if self._asked[robot] == MOST_ASKED:
@@ -78,10 +78,12 @@ class Robots:
                 )
 
 
-def _kept(looks: RobotLooks) -> Preface:
-    urdf = f"{looks.robot}.urdf"
-    facts = {"joints": " ".join(looks.joints), "description": urdf}
-    return Preface({f"{JOINTS}{looks.robot}": facts}, {urdf: looks.urdf.encode()})
+def _kept(robot_description: RobotDescription) -> Preface:
+    urdf = f"{robot_description.robot}.urdf"
+    facts = {"joints": " ".join(robot_description.joints), "description": urdf}
+    return Preface(
+        {f"{JOINTS}{robot_description.robot}": facts}, {urdf: robot_description.urdf.encode()}
+    )
 
 
 def _unknown(robot: str) -> Preface:

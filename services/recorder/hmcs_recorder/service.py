@@ -32,10 +32,10 @@ from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.verbs import LAST_STEPS, OUTLINE, RECORD, SET_LABELS
 from hmcs.bus.wire import encode
 from hmcs.errors import UserError
+from hmcs.recordings.file_rotation import Limits, Preface, Recording
+from hmcs.recordings.json_codec import Fields, fields_of
 from hmcs.recordings.label_files import has_fingerprint
 from hmcs.recordings.labels import labels_beside
-from hmcs.recordings.parts import Limits, Preface, Recording
-from hmcs.recordings.plain import Fields, fields_of
 from hmcs_recorder.labeling import labels_set, outline_of
 from hmcs_recorder.prefacing import ask_all, joined, preface_of
 from hmcs_recorder.robots import Robots
@@ -48,7 +48,7 @@ MOST_PAST_STEPS = 10_000
 RETRY_S = 5.0
 """After so long without room it is tried again."""
 LARGEST_CLOCK_DIFFERENCE_NS = 5_000_000_000
-"""A capture that seems longer ago was told by another machine's clock."""
+"""A capture that seems longer ago has the time of another machine's clock."""
 
 
 class Recorder(Service):
@@ -73,7 +73,7 @@ class Recorder(Service):
         self._reading = ThreadPoolExecutor(1, thread_name_prefix="reading")
 
     def start(self) -> None:
-        """Listen, and record unless told to wait."""
+        """Listen, and record unless the settings say to wait."""
         RECORD.answer(self.bus, self._asked)
         OUTLINE.answer(self.bus, self._outline, aside=self._reading)
         SET_LABELS.answer(self.bus, self._set_labels, aside=self._reading)
@@ -88,7 +88,7 @@ class Recorder(Service):
             lost = self.bus.counters.lost[LOST]
             return False, f"not recording, {lost} messages lost: {self._trouble}"
         if self._recording is None:
-            return True, "waiting to be told to record"
+            return True, "waiting for a request to record"
         return True, f"recording to {self._recording.path}, {self._recording.messages} messages"
 
     def facts(self) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from hmcs.bus.messages import Ask, RobotLooks, RobotState
+from hmcs.bus.messages import Ask, RobotDescription, RobotState
 from hmcs.recordings.reading import read
 from hmcs_recorder import robots
 from support.recorder import Bench, denied, pumped
@@ -62,11 +62,11 @@ class Robot:
     def __init__(self, stack: Stack, *, answers: bool) -> None:
         self.bus = stack.open_bus("robot", f"arm-{answers}")
         self._states = self.bus.publisher(RobotState, self.bus.keys.robot_state)
-        looks = RobotLooks(
+        robot_description = RobotDescription(
             robot="two-joints", urdf="<robot/>", joints=("waist", "elbow"), files={"a": b"mesh"}
         )
         if answers:
-            self.bus.answer("looks", Ask, lambda _: looks)
+            self.bus.answer("looks", Ask, lambda _: robot_description)
 
     def state(self) -> None:
         still = np.zeros(6)
@@ -107,7 +107,7 @@ def test_joints_are_shown_by_the_names_that_the_robot_says_they_have(
     (file,) = bench.folder.glob("*.mcap")
     robots = bench.service._robots
     with pumped(robot.bus):
-        stack.until(lambda: robot.state() or "two-joints" in robots._looks)
+        stack.until(lambda: robot.state() or "two-joints" in robots._robot_descriptions)
         stack.until(lambda: robot.state() or not bench.service._recording.undescribed)  # type: ignore[union-attr]
         time_out = bench.bus.counters.received[RobotState.SCHEMA] + 20
         stack.until(

@@ -78,7 +78,7 @@ def test_a_request_that_fails_is_refused_and_not_carried_out_later(
         patch.setattr(Path, "mkdir", denied)
         with pytest.raises(RequestRefusedError, match="Permission denied"):
             bench.service._asked(Record(on=True, name="take"))
-    assert bench.service.health() == (True, "waiting to be told to record")
+    assert bench.service.health() == (True, "waiting for a request to record")
     bench.service._again_s = 0.0
     bench.service._on_flush()
     bench.sample_unrecorded()

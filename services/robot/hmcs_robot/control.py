@@ -71,7 +71,7 @@ class Standing(NamedTuple):
     """Where it is held, rad, shape (n,); None until it has come to rest."""
 
 
-class Motion(NamedTuple):
+class JointCommand(NamedTuple):
     """What the arm is to do in this tick, and why."""
 
     joint_velocities: Array
@@ -88,7 +88,7 @@ class Motion(NamedTuple):
         return self.carried.twist if isinstance(self.carried, Following) else np.zeros(6)
 
 
-def stand(arm: ArmState, carried: Following | Standing, tuning: Tuning) -> Motion:
+def stand(arm: ArmState, carried: Following | Standing, tuning: Tuning) -> JointCommand:
     """Return the motion that brings the arm to a stand as fast as it can brake, and holds it there.
 
     An arm in contact is not held in place, lest it press on what it touches.
@@ -96,11 +96,11 @@ def stand(arm: ArmState, carried: Following | Standing, tuning: Tuning) -> Motio
     still = float(np.abs(arm.joint_velocities).max()) < tuning.standing_rad_s
     place = carried.joint_positions if isinstance(carried, Standing) else None
     if arm.touches or (place is None and not still):
-        return Motion(np.zeros_like(arm.joint_positions), Standing(), ())
+        return JointCommand(np.zeros_like(arm.joint_positions), Standing(), ())
     if place is None:
         place = arm.joint_positions
     back = np.clip(tuning.correction_per_s * (place - arm.joint_positions), -0.05, 0.05)
-    return Motion(back, Standing(place), ())
+    return JointCommand(back, Standing(place), ())
 
 
 def follow(
@@ -112,7 +112,7 @@ def follow(
     tuning: Tuning,
     period_s: float,
     planes: Candidates = NOTHING,
-) -> Motion:
+) -> JointCommand:
     """Return the motion that follows `twist`, m/s and rad/s, shape (6,), within all limits.
 
     The speed limits keep the direction of the linear and of the angular part; a wall of the
@@ -166,7 +166,7 @@ def follow(
         *(("acceleration",) if _differ(wanted, scale * slowed) else ()),
         *hard_bound,
     )
-    return Motion(
+    return JointCommand(
         slowing * velocities,
         Following(pose, followed),
         tuple(dict.fromkeys(limited)),

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hmcs_robot.channel import Numbered, Request, SignOfLife, Snapshot, StopAsked
-from hmcs_robot.control import Following, Motion, Standing, Tuning, follow, stand
+from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow, stand
 from hmcs_robot.driver import ArmDriver
 from hmcs_robot.fence import Fence
 from hmcs_robot.limits import Limits
@@ -54,7 +54,7 @@ class ControlLoop:
         self._planes = rules.fence.planes(self._arm.tool)
         self._posture = self._arm.joint_positions
         self._supervision = Supervision()
-        self._motion = Motion(np.zeros_like(self._posture), Standing(), ())
+        self._joint_command = JointCommand(np.zeros_like(self._posture), Standing(), ())
         self._done_ns = now_ns
         self._taken = -1
         self._taken_ns: int | None = None
@@ -99,7 +99,7 @@ class ControlLoop:
 
     def snapshot(self) -> Snapshot:
         """Return what is to be said of the arm now."""
-        arm, motion, distances = self._arm, self._motion, self._planes.distances
+        arm, motion, distances = self._arm, self._joint_command, self._planes.distances
         margin_m = self._rules.fence.margin_m
         return Snapshot(
             arm.joint_positions,
@@ -146,13 +146,13 @@ class ControlLoop:
             self._rules.policy,
             refused=self._refused > self._refused_at_taken,
         )
-        self._motion = self._next_motion()
-        self._driver.move(self._motion.joint_velocities)
+        self._joint_command = self._next_joint_command()
+        self._driver.move(self._joint_command.joint_velocities)
         self._arm = self._driver.read()
         self._planes = self._rules.fence.planes(self._arm.tool)
 
-    def _next_motion(self) -> Motion:
-        stop, carried, rules = self._supervision.stop, self._motion.carried, self._rules
+    def _next_joint_command(self) -> JointCommand:
+        stop, carried, rules = self._supervision.stop, self._joint_command.carried, self._rules
         braking = (
             isinstance(carried, Following)
             and stop not in AT_ONCE

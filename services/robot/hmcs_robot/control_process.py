@@ -100,7 +100,7 @@ def take_priority(realtime_priority: int) -> str:
 
 def _run(channel: Channel, loop: ControlLoop, settings: RobotSettings) -> None:
     cycles_per_state = max(1, round(settings.physics_rate_hz / settings.state_rate_hz))
-    cycles, told = cycles_per_state, ""
+    cycles, last_stop = cycles_per_state, ""
     until_ns: int | None = None
     while until_ns is None or time.monotonic_ns() < until_ns:
         begun_ns = time.monotonic_ns()
@@ -111,8 +111,8 @@ def _run(channel: Channel, loop: ControlLoop, settings: RobotSettings) -> None:
                 # Nothing is fresh from here on: the arm comes to a stand by itself.
                 until_ns = begun_ns + round(STANDS_WITHIN_S * NS_PER_S)
         cycles += loop.tick(time.monotonic_ns())
-        if cycles >= cycles_per_state or loop.stop != told:
-            cycles, told = 0, loop.stop
+        if cycles >= cycles_per_state or loop.stop != last_stop:
+            cycles, last_stop = 0, loop.stop
             if until_ns is None:
                 try:
                     channel.send(pack_snapshot(loop.snapshot()))

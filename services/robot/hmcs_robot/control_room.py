@@ -44,16 +44,16 @@ class ControlRoom:
         self._reader: threading.Thread | None = None
         try:
             self.channel.send(settings.model_dump_json().encode())
-            told = json.loads(self._wait_for_first())
+            first = json.loads(self._wait_for_first())
         except BaseException:
             self.close()
             raise
-        if "mistake" in told:
+        if "mistake" in first:
             self.close()
-            raise UserError(told["mistake"])
-        self.priority: str = told["ready"]["priority"]
-        self.joint_names: tuple[str, ...] = tuple(told["ready"]["joint_names"])
-        self.links_within: tuple[str, ...] = tuple(told["ready"]["links_within"])
+            raise UserError(first["mistake"])
+        self.priority: str = first["ready"]["priority"]
+        self.joint_names: tuple[str, ...] = tuple(first["ready"]["joint_names"])
+        self.links_within: tuple[str, ...] = tuple(first["ready"]["links_within"])
 
     @property
     def running(self) -> bool:

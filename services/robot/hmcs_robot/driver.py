@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from hmcs.arrays import Array
-from hmcs_robot.looks import Looks
+from hmcs_robot.arm_description import ArmDescription
 
 
 class Pose(NamedTuple):
@@ -106,7 +106,7 @@ class ArmDriver(Protocol):
         """Follow `joint_velocities`, rad/s, shape (n,), for one control period."""
         ...
 
-    def looks(self) -> Looks:
+    def robot_description(self) -> ArmDescription:
         """Return what is needed to draw it."""
         ...
 

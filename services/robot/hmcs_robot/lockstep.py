@@ -9,7 +9,7 @@ import numpy as np
 
 from hmcs.arrays import Array
 from hmcs.task import Task
-from hmcs_robot.control import Motion, Standing, follow
+from hmcs_robot.control import JointCommand, Standing, follow
 from hmcs_robot.set_up import limits_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings
 
@@ -28,7 +28,7 @@ class LockstepRobot:
         self._tuning = tuning_of(settings)
         self._arm = self._driver.read()
         self._posture = self._arm.joint_positions
-        self._motion = Motion(np.zeros_like(self._posture), Standing(), ())
+        self._joint_command = JointCommand(np.zeros_like(self._posture), Standing(), ())
         self._behind_s = 0.0
         self._touched: set[str] = set()
 
@@ -52,16 +52,16 @@ class LockstepRobot:
         self._behind_s += period_s
         while self._behind_s > 0.5 * self._period_s:
             self._behind_s -= self._period_s
-            self._motion = follow(
+            self._joint_command = follow(
                 self._arm,
                 twist,
-                self._motion.carried,
+                self._joint_command.carried,
                 self._posture,
                 self._limits,
                 self._tuning,
                 self._period_s,
             )
-            self._driver.move(self._motion.joint_velocities)
+            self._driver.move(self._joint_command.joint_velocities)
             self._arm = self._driver.read()
             self._touched.update(self._arm.contacts)
 

@@ -18,7 +18,7 @@ from hmcs.bus.messages import (
     Done,
     Origin,
     Pairing,
-    RobotLooks,
+    RobotDescription,
     RobotState,
     StopRequest,
 )
@@ -26,6 +26,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import LOOKS, STOP
 from hmcs.task import load_task
+from hmcs_robot.arm_description import arm_description, missing_meshes
 from hmcs_robot.channel import (
     Closed,
     Snapshot,
@@ -36,7 +37,6 @@ from hmcs_robot.channel import (
     writer_id,
 )
 from hmcs_robot.control_room import ControlRoom, ControlRoomError
-from hmcs_robot.looks import looks_of, missing_meshes
 from hmcs_robot.robots import ROBOTS
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.supervision import Order
@@ -79,7 +79,7 @@ class Robot(Service):
     def start(self) -> None:
         """Listen and begin to move."""
         bus = self.bus
-        LOOKS.answer(bus, self._looks)
+        LOOKS.answer(bus, self._robot_description)
         STOP.answer(bus, self._on_stop)
         bus.subscribe(Command, bus.keys.command, self._on_command)
         bus.subscribe(StopRequest, bus.keys.stop_request, self._on_stop_request)
@@ -257,6 +257,6 @@ class Robot(Service):
             command_age_s=snapshot.command_age_s,
         )
 
-    def _looks(self, _: Ask) -> RobotLooks:
-        looks = looks_of(ROBOTS[self._task.robot.model].urdf, self._joint_names)
-        return RobotLooks(robot=self._task.robot.model, **looks._asdict())
+    def _robot_description(self, _: Ask) -> RobotDescription:
+        robot_description = arm_description(ROBOTS[self._task.robot.model].urdf, self._joint_names)
+        return RobotDescription(robot=self._task.robot.model, **robot_description._asdict())

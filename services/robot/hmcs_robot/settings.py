@@ -1,4 +1,4 @@
-"""What the robot can be told."""
+"""Settings of the robot."""
 
 from __future__ import annotations
 

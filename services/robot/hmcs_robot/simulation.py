@@ -12,10 +12,10 @@ from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm import BASE_LINK, Arm
+from hmcs_robot.arm_description import ArmDescription, arm_description
 from hmcs_robot.bodies import add_obstacle, add_region, links_touching
 from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.kinematics import inverse_kinematics
-from hmcs_robot.looks import Looks, looks_of
 from hmcs_robot.robots import ROBOTS
 
 _GRAVITY_M_S2 = 9.81
@@ -155,9 +155,9 @@ class Simulation:
         )
         pybullet.stepSimulation(physicsClientId=self._client)
 
-    def looks(self) -> Looks:
+    def robot_description(self) -> ArmDescription:
         """Return what is needed to draw the arm."""
-        return looks_of(ROBOTS[self.name].urdf, self.arm.joint_names)
+        return arm_description(ROBOTS[self.name].urdf, self.arm.joint_names)
 
     def close(self) -> None:
         """End the simulation."""

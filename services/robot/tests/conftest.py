@@ -8,7 +8,7 @@ import pytest
 
 from hmcs.task import Obstacle
 from hmcs_robot.arm import Arm
-from hmcs_robot.control import Following, Motion, Standing, Tuning, follow
+from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow
 from hmcs_robot.driver import Pose
 from hmcs_robot.limits import Limits
 from hmcs_robot.robots import ROBOTS
@@ -33,7 +33,7 @@ class Bench:
         self.tuning = Tuning()
         self.carried: Following | Standing = Standing()
 
-    def follow(self, twist: np.ndarray) -> Motion:
+    def follow(self, twist: np.ndarray) -> JointCommand:
         """Follow `twist` for one cycle."""
         motion = follow(
             self.simulation.read(),

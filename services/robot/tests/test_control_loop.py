@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from hmcs.arrays import Array
 from hmcs.fixtures.regions.forbidden import Plane, Region, sphere
 from hmcs.fixtures.regions.tool_shape import ToolShape
+from hmcs_robot.arm_description import ArmDescription
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired
 from hmcs_robot.control import Tuning
 from hmcs_robot.control_loop import ControlLoop, Rules
 from hmcs_robot.driver import ArmState, JointLimits, Pose
 from hmcs_robot.fence import Fence
 from hmcs_robot.limits import Limits
-from hmcs_robot.looks import Looks
 from hmcs_robot.supervision import Order, Policy
 
 PERIOD_NS = 4_000_000
@@ -48,8 +48,8 @@ class Gantry:
         self.speeds = joint_velocities
         self.joints = self.joints + joint_velocities * (PERIOD_NS / 1e9)
 
-    def looks(self) -> Looks:
-        return Looks("", self.joint_names, {})
+    def robot_description(self) -> ArmDescription:
+        return ArmDescription("", self.joint_names, {})
 
     def close(self) -> None:
         pass

@@ -1,4 +1,4 @@
-"""The robot that moves when it is told to."""
+"""The robot that moves one step at each call."""
 
 from __future__ import annotations
 

@@ -241,7 +241,7 @@ events = st.lists(st.tuples(st.integers(1, 90), st.one_of(orders, contacts)), ma
 def test_it_moves_only_on_the_fresh_word_of_one_writer_that_released_and_engaged(
     history: list[tuple[int, Any]],
 ) -> None:
-    """Against the rule itself, told from the whole history instead of from a state."""
+    """Against the rule itself, from the whole history instead of from a state."""
     story = Story()
     story.tick(0)
     at_ms = 0

@@ -1,7 +1,7 @@
 """Runs a task HMM."""
 
 from hmcs.bus.service import run
-from hmcs_task_hmm.service import TaskHmm
+from hmcs_task_hmm.service import TaskFilterService
 
 if __name__ == "__main__":
-    raise SystemExit(run(TaskHmm))
+    raise SystemExit(run(TaskFilterService))

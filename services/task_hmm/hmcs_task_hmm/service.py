@@ -21,18 +21,18 @@ from hmcs.recognition.segment_filter.recognizer import (
 from hmcs.translation import belief_message, step_of
 from hmcs_task_hmm.gathering import Gathering
 from hmcs_task_hmm.reading import UnusableEvidenceError, read_evidence
-from hmcs_task_hmm.settings import TaskHmmSettings
+from hmcs_task_hmm.settings import TaskFilterServiceSettings
 
 _NS_PER_MS = 1_000_000
 
 
-class TaskHmm(Service):
+class TaskFilterService(Service):
     """Publishes a belief for every step, with all evidence or, past the deadline, without."""
 
     name = "task_hmm"
-    Settings = TaskHmmSettings
+    Settings = TaskFilterServiceSettings
 
-    def __init__(self, settings: TaskHmmSettings, bus: Bus, log: logging.Logger) -> None:
+    def __init__(self, settings: TaskFilterServiceSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._model = load_model(settings.model, verify=signed_by(settings.model_key))
         self._recognizer = TaskFilter(self._model)

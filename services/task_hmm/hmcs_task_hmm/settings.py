@@ -9,8 +9,8 @@ from pydantic import Field
 from hmcs.bus.settings import ServiceSettings
 
 
-class TaskHmmSettings(ServiceSettings):
-    """What a task HMM can be told."""
+class TaskFilterServiceSettings(ServiceSettings):
+    """Settings of the task HMM."""
 
     model: Path
     """The model file."""

@@ -1,4 +1,4 @@
-"""Trains once and ends, with the CLI of `hmcs train`; or, told to `serve`, waits to be asked."""
+"""Trains once and ends, with the CLI of `hmcs train`; or, as `serve`, waits for requests."""
 
 from __future__ import annotations
 

@@ -17,14 +17,16 @@ WIDE_SHARE = 0.1
 
 def advice(model: Model, judgment: Judgment) -> list[str]:
     """Return what to do next, the most important first; at least one sentence."""
-    told = [*_confused(model, judgment), *_late(judgment), *_wide(model)]
+    sentences = [*_confused(model, judgment), *_late(judgment), *_wide(model)]
     if not judgment.left_out:
-        told.insert(
+        sentences.insert(
             0,
             "No demonstration can be left out, so nobody knows how well this model recognizes: "
             "show the whole task at least twice.",
         )
-    return told or ["Nothing stands out: the states are told apart, soon, and shown alike."]
+    return sentences or [
+        "Nothing stands out: states are recognized correctly and soon, and demonstrations agree."
+    ]
 
 
 def _confused(model: Model, judgment: Judgment) -> list[str]:

@@ -16,7 +16,7 @@ from hmcs.bus.messages import Train
 from hmcs.bus.session import RequestRefusedError
 from hmcs.errors import UserError
 from hmcs.recognition.registry import DEFAULT, kind_named
-from hmcs.recordings.parts import SUFFIX as RECORDING
+from hmcs.recordings.file_rotation import SUFFIX as RECORDING
 from hmcs.task import shipped_tasks
 from hmcs_trainer.references import is_drawing
 

@@ -1,4 +1,4 @@
-"""States found in demonstrations, whatever labels they have: found, told, written down."""
+"""States found in demonstrations, whatever labels they have: found, reported, written down."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.discovery.unlabeled import UnlabeledSettings, discover, labeled
 from hmcs.recordings.demonstrations import stretches_of
-from hmcs.recordings.found import is_as_found, marked
+from hmcs.recordings.generated_marker import is_unchanged_generated, with_generated_marker
 from hmcs.recordings.labels import How, how_labeled, labels_beside, labels_of, write_labels
 from hmcs.task import Task
 from hmcs.whole_files import written_whole
@@ -71,12 +71,12 @@ def check_places(sources: Sequence[Source], task_file: Path) -> None:
         if source.recording is None:
             continue
         beside = labels_beside(source.recording.path)
-        if beside.exists() and not is_as_found(beside):
+        if beside.exists() and not is_unchanged_generated(beside):
             raise UserError(
                 f"{beside}: has labels that somebody set, and --find-states would write its own in "
                 "their place: move that file away, or train without --find-states"
             )
-    if task_file.exists() and not is_as_found(task_file):
+    if task_file.exists() and not is_unchanged_generated(task_file):
         raise UserError(
             f"{task_file}: is there already, and --find-states would write the task it finds in "
             "its place: name another --output, or move that file away"
@@ -153,4 +153,4 @@ def _write_task(task: Task, file: Path) -> None:
     data = {"format": task.format, "name": task.name} | data
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
     with written_whole(file) as unfinished:
-        unfinished.write_text(marked(text), encoding="utf-8", newline="\n")
+        unfinished.write_text(with_generated_marker(text), encoding="utf-8", newline="\n")

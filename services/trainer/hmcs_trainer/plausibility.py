@@ -200,7 +200,7 @@ def _gaps(task: Task, shown: Demonstration) -> Iterator[Finding]:
         )
 
 
-class _Motion(NamedTuple):
+class _SampledSpeeds(NamedTuple):
     period_s: Array
     """From each sample to the next, shape (T − 1,)."""
     moved_m: Array
@@ -224,9 +224,9 @@ def _longest_periods(time_s: Array) -> Array:
     return longest
 
 
-def _motion(shown: Demonstration, period_s: Array) -> _Motion:
+def _motion(shown: Demonstration, period_s: Array) -> _SampledSpeeds:
     moved_m = np.linalg.norm(np.diff(shown.positions, axis=0), axis=1)
-    return _Motion(period_s, moved_m, moved_m / period_s)
+    return _SampledSpeeds(period_s, moved_m, moved_m / period_s)
 
 
 def length_of(steps: Iterable[Step]) -> float:

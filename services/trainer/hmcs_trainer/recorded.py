@@ -38,5 +38,5 @@ def recording_findings(task: Task, content: RecordingContent) -> Iterator[Findin
             f"first {first.messages} of them before {first.at_s:.2f} s: the way is straight there; "
             "leave it out, if that was not meant",
         )
-    for told in (*damages(content), *unread(content, Motion), *label_notes(content)):
-        yield Finding(False, f"{name}: {told}")
+    for sentence in (*damages(content), *unread(content, Motion), *label_notes(content)):
+        yield Finding(False, f"{name}: {sentence}")

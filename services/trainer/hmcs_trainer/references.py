@@ -14,8 +14,8 @@ import numpy as np
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
 from hmcs.motion.lasa import read_drawing
 from hmcs.recordings.demonstrations import demonstrations_of, performances_of
+from hmcs.recordings.file_rotation import SUFFIX as RECORDING
 from hmcs.recordings.labels import labels_of
-from hmcs.recordings.parts import SUFFIX as RECORDING
 from hmcs.recordings.reading import RecordingContent, RecordingError, read
 from hmcs.task import Task
 
@@ -71,14 +71,14 @@ def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
     A demonstration is another one where its positions or its labels differ, whatever it is called:
     a file may be named twice, or copied.
     """
-    kept, told = list[Source](), list[str]()
+    kept, notes = list[Source](), list[str]()
     known = dict[bytes, str]()
     for source in sources:
         own = []
         for demonstration in source.demonstrations:
             content = _digest(demonstration)
             if content in known:
-                told.append(
+                notes.append(
                     f"{demonstration.name}: the same samples as {known[content]}: left out, since "
                     "it would count twice"
                 )
@@ -87,7 +87,7 @@ def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
                 own.append(demonstration)
         if own:
             kept.append(source._replace(demonstrations=tuple(own)))
-    return kept, told
+    return kept, notes
 
 
 def _digest(demonstration: Demonstration) -> bytes:

@@ -58,7 +58,7 @@ def write_report(
     found: Sequence[Finding],
 ) -> None:
     """Write the page, whole or not at all; it needs no other file."""
-    told = "".join(map(_item, (finding.text for finding in found)))
+    items = "".join(map(_item, (finding.text for finding in found)))
     page = _PAGE.substitute(
         name=as_html(model.name),
         facts=as_html(
@@ -67,7 +67,7 @@ def write_report(
         ),
         numbers=as_html(numbers(judgment)),
         advice="".join(map(_item, advice)),
-        findings=f"<h2>About the demonstrations</h2><ul>{told}</ul>" if told else "",
+        findings=f"<h2>About the demonstrations</h2><ul>{items}</ul>" if items else "",
         confusion=_svg(_confusion(model, judgment)),
         guides=_svg(_guides(model)),
     )

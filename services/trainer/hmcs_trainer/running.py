@@ -61,16 +61,16 @@ class RunningJob:
     def news(self) -> list[str]:
         """Return what was said since the last time, and give it up once it takes too long."""
         said: list[str] = []
-        while (told := self._next()) is not None:
-            if "error" in told:
-                self._error = _shortened(told["error"])
-            elif "detail" in told:
-                self.detail = _shortened(told["detail"])
+        while (fields := self._next()) is not None:
+            if "error" in fields:
+                self._error = _shortened(fields["error"])
+            elif "detail" in fields:
+                self.detail = _shortened(fields["detail"])
                 if self.detail == _JUDGING:
                     self.stage, self.share = _JUDGING, _LEARNED_SHARE
                 said.append(self.detail)
-            elif self.stage == _JUDGING and told.get("count"):
-                done = float(told["done"]) / float(told["count"])
+            elif self.stage == _JUDGING and fields.get("count"):
+                done = float(fields["done"]) / float(fields["count"])
                 done = min(max(done, 0.0), 1.0) if math.isfinite(done) else 0.0
                 self.share = _LEARNED_SHARE + (1.0 - _LEARNED_SHARE) * done
                 said.append(self.detail)
@@ -112,11 +112,11 @@ class RunningJob:
             except Empty:
                 return None
             try:
-                told = json.loads(line)
+                said = json.loads(line)
             except ValueError:
-                told = None
-            if isinstance(told, dict):
-                return told
+                said = None
+            if isinstance(said, dict):
+                return said
             # A library that prints something.
             self._note(line)
 
@@ -126,8 +126,8 @@ class RunningJob:
 
 
 def _shortened(text: object) -> str:
-    told = " ".join(str(text).split())
-    return told if len(told) <= LONGEST_DETAIL else f"{told[: LONGEST_DETAIL - 1]}…"
+    one_line = " ".join(str(text).split())
+    return one_line if len(one_line) <= LONGEST_DETAIL else f"{one_line[: LONGEST_DETAIL - 1]}…"
 
 
 def _write(stream: IO[str], text: str) -> None:

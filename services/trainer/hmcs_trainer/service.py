@@ -102,14 +102,14 @@ class Trainer(Service):
 
     def _on_progress(self, received: Received[TrainingProgress]) -> None:
         """Keep what other trainers are at."""
-        instance, told = received.envelope.source.instance, received.body
+        instance, progress = received.envelope.source.instance, received.body
         self._elsewhere.pop(instance, None)
-        if told.stage in _ENDED or instance == self.bus.source.instance:
+        if progress.stage in _ENDED or instance == self.bus.source.instance:
             return
         if len(self._elsewhere) >= MOST_ELSEWHERE:
             oldest = min(self._elsewhere, key=lambda name: self._elsewhere[name].heard_s)
             self._elsewhere.pop(oldest)
-        self._elsewhere[instance] = _Elsewhere(told.model, time.monotonic())
+        self._elsewhere[instance] = _Elsewhere(progress.model, time.monotonic())
 
     def _on_trainer(self, key: str, alive: bool) -> None:
         if not alive:

@@ -30,7 +30,7 @@ from hmcs_trainer.validation import findings
 def checked(
     task: Task, references: Sequence[str], progress: Callable[[str], None]
 ) -> tuple[int, int]:
-    """Return how many demonstrations would be learned from, and how many findings were told.
+    """Return how many demonstrations would be learned from, and how many findings were reported.
 
     Raises a UserError as `train` does before it learns anything.
     """

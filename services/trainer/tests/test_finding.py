@@ -1,4 +1,4 @@
-"""States found without labels, and what is told of recordings that are trained from."""
+"""States found without labels, and what is reported of recordings that are trained from."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration, read_csv, write_csv
 from hmcs.recognition.registry import DEFAULT
 from hmcs.recognition.segments import LearningError
-from hmcs.recordings import plain
+from hmcs.recordings import json_codec
+from hmcs.recordings.file_rotation import Preface, Recording
 from hmcs.recordings.labels import labels_beside, labels_of
-from hmcs.recordings.parts import Preface, Recording
 from hmcs.recordings.reading import RecordingError, read
 from hmcs.task import find_task, load_task
 from hmcs_trainer.__main__ import main
@@ -266,7 +266,7 @@ def test_a_recording_of_another_version_of_the_contract_is_told(
 ) -> None:
     file = str(maker.write(hand(shown(1).positions)))
     monkeypatch.setattr(Motion, "VERSION", 9)
-    monkeypatch.delitem(plain.BY_SCHEMA, "motion/1")
+    monkeypatch.delitem(json_codec.BY_SCHEMA, "motion/1")
     assert "has motion/1, expected motion/9: it was recorded with version 1.2.3" in refused(
         [file], tmp_path
     )

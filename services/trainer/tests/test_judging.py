@@ -94,7 +94,7 @@ def test_advice_names_the_states_that_are_confused_and_what_would_help() -> None
     judgment = judged(LINES, demonstrations, None, DEFAULT)
     model = learn(LINES, demonstrations)
     assert advice(model, judgment) == [
-        "Nothing stands out: the states are told apart, soon, and shown alike."
+        "Nothing stands out: states are recognized correctly and soon, and demonstrations agree."
     ]
     confused = np.diag([40, 40, 40, 40])
     confused[0, 1] = 20

@@ -85,7 +85,7 @@ def check_gestemes(gestemes: Gestemes, task: Task) -> None:
         raise ValueError(f"gesteme HMMs emit {emissions[0].shape[2:]}, but {expected} is observed")
 
 
-class GestemeClassifier:
+class GestemeHmmClassifier:
     """Says after each step which gesteme is performed."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Chapter 3's sub-tasks: motion along nominal directions, told by a fully connected HMM (3.1).
+"""Chapter 3's sub-tasks: motion along nominal directions, by a fully connected HMM (3.1).
 
 Nominal directions are found in demonstrations without labels; an estimator says which of them a
 step goes along, and the HMM's filtered probabilities (3.5) which is followed.

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from hmcs.arrays import Array
 from hmcs.recognition.segments import LearningError
 from hmcs_baselines.chords import Chords, Piece, cut, median_spread
+from hmcs_baselines.cluster_count import CusumSettings, cusum_elbow, search_clusters
 from hmcs_baselines.clustering import assign
-from hmcs_baselines.elbow import CusumSettings, cusum_elbow, search_clusters
 from hmcs_baselines.line_sequence import (
     Laying,
     LineSequence,

@@ -54,7 +54,7 @@ class DirectionTaskSettings(NamedTuple):
 
 
 class DirectionTask(NamedTuple):
-    """Directions, and a task told by them."""
+    """Directions, and a task recognized by them."""
 
     directions: DirectionStates
     chain: SlotChain
@@ -136,7 +136,7 @@ def _check(known: DirectionTask, task: Task) -> None:
 
 KIND = RecognizerSpec(
     name="directions-svm",
-    summary="nominal motion directions found without labels, told apart step by step, and an HMM",
+    summary="nominal motion directions found without labels, recognized step by step, and an HMM",
     source="Aarno 2007, chapter 3",
     settings=DirectionTaskSettings,
     knowledge=DirectionTask,

@@ -20,7 +20,7 @@ from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segments import LearningError
-from hmcs.recognition.sensors import sensor_rows
+from hmcs.recognition.step_features import step_features
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from hmcs_baselines.estimators import (
@@ -125,8 +125,8 @@ def _rows(
 ) -> Array:
     """What is observed in each step, shape (T, F), NaN where it was not felt."""
     if observed == "direction":
-        return sensor_rows(steps, ("direction",), components)
-    return sensor_rows(steps, ("force", "torque"), ())[:, list(components)]
+        return step_features(steps, ("direction",), components)
+    return step_features(steps, ("force", "torque"), ())[:, list(components)]
 
 
 def _learn(data: TrainingData) -> ForceTask:

@@ -41,7 +41,7 @@ class TaskLevelSettings(NamedTuple):
     """Of Baum–Welch with B fixed, at most."""
 
 
-class TaskHmm(NamedTuple):
+class GestemeTaskHmm(NamedTuple):
     """The task HMM."""
 
     initial: Array
@@ -52,7 +52,7 @@ class TaskHmm(NamedTuple):
     """B: P(gesteme passed up | state), shape (S, M)."""
 
 
-class Told(NamedTuple):
+class GestemeLevelOutput(NamedTuple):
     """What the gesteme level passed up in a demonstration, and the truth."""
 
     gestemes: Array
@@ -62,8 +62,8 @@ class Told(NamedTuple):
 
 
 def learn_task_level(
-    chain: TaskChain, told: Sequence[Told], settings: TaskLevelSettings
-) -> TaskHmm:
+    chain: TaskChain, told: Sequence[GestemeLevelOutput], settings: TaskLevelSettings
+) -> GestemeTaskHmm:
     """Return the task HMM learned from what the gesteme level said of the demonstrations.
 
     Training begins from the task's own network, with segments as long as demonstrated; where the
@@ -90,7 +90,7 @@ def learn_task_level(
         k for k, state in enumerate(seen) if any(_departs(run.states, state) for run in runs)
     ]
     transition[np.ix_(seen[departed], seen)] = learned.transition[departed]
-    return TaskHmm(
+    return GestemeTaskHmm(
         _mixed(chain.initial, settings.any_state),
         _mixed(_normalized(transition), settings.any_state),
         _completed(learned.emission.probabilities, seen, chain),
@@ -100,7 +100,7 @@ def learn_task_level(
 class TaskLevel:
     """Moves the belief over task states by what the gesteme level passes up."""
 
-    def __init__(self, task_hmm: TaskHmm, *, anywhere: bool = False) -> None:
+    def __init__(self, task_hmm: GestemeTaskHmm, *, anywhere: bool = False) -> None:
         """Begin as the task does or, with `anywhere`, in any state."""
         states = len(task_hmm.initial)
         initial = np.full(states, 1.0 / states) if anywhere else task_hmm.initial
@@ -140,7 +140,7 @@ def state_given_gesteme(chain: TaskChain, gestemes: int) -> Array:
     return np.asarray(joint / joint.sum(axis=0))
 
 
-def check_task_hmm(task_hmm: TaskHmm, states: int, gestemes: int) -> None:
+def check_task_hmm(task_hmm: GestemeTaskHmm, states: int, gestemes: int) -> None:
     """Raise ValueError where the arrays are not for so many states and gestemes, or hold no
     probabilities above zero."""
     shapes = {
@@ -155,17 +155,17 @@ def check_task_hmm(task_hmm: TaskHmm, states: int, gestemes: int) -> None:
         check_distributions(field, array)
 
 
-def _labeled_runs(told: Told) -> Iterator[Told]:
+def _labeled_runs(told: GestemeLevelOutput) -> Iterator[GestemeLevelOutput]:
     """What was passed up in each stretch without a gap in its labels."""
     for labeled, run in groupby(range(len(told.states)), lambda t: told.states[t] >= 0):
         steps = list(run)
         if labeled:
             # Baum–Welch needs a transition.
             steps = steps if len(steps) > 1 else steps * 2
-            yield Told(told.gestemes[steps], told.states[steps])
+            yield GestemeLevelOutput(told.gestemes[steps], told.states[steps])
 
 
-def _network(chain: TaskChain, runs: Sequence[Told]) -> Array:
+def _network(chain: TaskChain, runs: Sequence[GestemeLevelOutput]) -> Array:
     """A with the task's arcs, and segments of each state as long as demonstrated."""
     lengths: list[list[int]] = [[] for _ in chain.initial]
     for run in runs:

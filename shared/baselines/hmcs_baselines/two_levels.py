@@ -21,7 +21,7 @@ from hmcs.recognition.segments import LabeledSteps, labeled_steps
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from hmcs_baselines.classifying import (
-    GestemeClassifier,
+    GestemeHmmClassifier,
     Gestemes,
     check_gestemes,
     learn_gestemes,
@@ -30,10 +30,10 @@ from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
 from hmcs_baselines.observing import ObservationSettings, Observed
 from hmcs_baselines.restarting import Classification, CusumSettings, Restart
 from hmcs_baselines.task_level import (
-    TaskHmm,
+    GestemeLevelOutput,
+    GestemeTaskHmm,
     TaskLevel,
     TaskLevelSettings,
-    Told,
     check_task_hmm,
     gesteme_shares,
     learn_task_level,
@@ -71,7 +71,7 @@ class TwoLevels(NamedTuple):
     """What gesteme HMMs and the task HMM above them know."""
 
     gestemes: Gestemes
-    task: TaskHmm | None
+    task: GestemeTaskHmm | None
     """None where it is shown nothing."""
     restart: Restart
     cusum: CusumSettings
@@ -97,9 +97,9 @@ def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLev
     told = []
     for demonstration in data.demonstrations:
         labeled = labeled_steps(task, demonstration)
-        classifier = GestemeClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
+        classifier = GestemeHmmClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
         passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
-        told.append(Told(np.array(passed), labeled.states))
+        told.append(GestemeLevelOutput(np.array(passed), labeled.states))
     data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
     task_hmm = learn_task_level(chain_of(task), told, settings.task)
     return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
@@ -131,7 +131,7 @@ class TwoLevelRecognizer:
     def __init__(self, model: Model, *, anywhere: bool) -> None:
         """Begin as the task does or, with `anywhere`, in any of its states."""
         knowledge: TwoLevels = model.knowledge
-        self._classifier = GestemeClassifier(
+        self._classifier = GestemeHmmClassifier(
             knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum
         )
         self._evidence = knowledge.evidence

@@ -7,8 +7,8 @@ import pytest
 
 from hmcs.recognition.task_chain import chain_of
 from hmcs_baselines.task_level import (
+    GestemeLevelOutput,
     TaskLevelSettings,
-    Told,
     check_task_hmm,
     learn_task_level,
 )
@@ -17,10 +17,10 @@ from support.lessons import lesson_task
 CHAIN = chain_of(lesson_task())
 
 
-def told(states: list[int]) -> Told:
+def told(states: list[int]) -> GestemeLevelOutput:
     """What sure gesteme HMMs say: states 0 to 3 are performed with gestemes 0, 1, 2 and 1."""
     gestemes = np.array([0, 1, 2, 1])[np.maximum(states, 0)]
-    return Told(np.eye(3)[gestemes], np.array(states, dtype=np.int64))
+    return GestemeLevelOutput(np.eye(3)[gestemes], np.array(states, dtype=np.int64))
 
 
 def test_a_labeled_stretch_of_a_single_step_is_learned_from() -> None:

@@ -31,7 +31,7 @@ class BusUnavailableError(UserError):
 
 
 class StoppedError(Exception):
-    """The process was told to stop while it waited for something on the bus."""
+    """The process was stopped while it waited for something on the bus."""
 
 
 def connect(
@@ -99,7 +99,7 @@ class _Waiting:
 
 
 class _Attempt:
-    """One attempt to open a session, on a thread of its own: Zenoh cannot be told to give it up."""
+    """One attempt to open a session, on a thread of its own: Zenoh cannot cancel it."""
 
     def __init__(self, settings: BusSettings) -> None:
         self._settings = settings

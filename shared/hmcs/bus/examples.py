@@ -28,7 +28,7 @@ from hmcs.bus.messages import (
     Pairing,
     Record,
     Refusal,
-    RobotLooks,
+    RobotDescription,
     RobotState,
     SetLabels,
     SettingsReport,
@@ -178,7 +178,7 @@ EXAMPLES: tuple[Message, ...] = (
     LastSteps(clock="5f0c1d2e3a4b", steps=(_STEP,), origins=(ORIGIN,)),
     LoadModel(path="/models/demo.hmcs"),
     ActivateRecognizer(model="demo"),
-    RobotLooks(
+    RobotDescription(
         robot="puma560",
         urdf='<robot name="puma560"/>',
         joints=("joint_1", "joint_2"),

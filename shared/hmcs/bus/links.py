@@ -26,7 +26,7 @@ class Links:
         self._log = log
 
         def event(event: zenoh.TransportEvent) -> None:
-            # Told by the event: what the session says of itself lags behind it.
+            # Known from the event: the session's own state lags behind it.
             peer, opened = str(event.transport.zid), event.kind == zenoh.SampleKind.PUT
             mailbox.put(lambda: self._changed(peer, opened))
 

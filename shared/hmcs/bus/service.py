@@ -1,8 +1,8 @@
 """How a process lives: settings, loop, health, shutdown.
 
-A service is a class and one line, `raise SystemExit(run(TaskHmm))`. `run` waits for a router,
-constructs the service, starts it, answers `health`, `describe` and `settings` for it, announces its
-presence, and pumps the bus until SIGTERM or SIGINT.
+A service is a class and one line, `raise SystemExit(run(TaskFilterService))`. `run` waits for
+a router, constructs the service, starts it, answers `health`, `describe` and `settings` for it,
+announces its presence, and pumps the bus until SIGTERM or SIGINT.
 
 Only starting can fail for good: a UserError there is a mistake of the user and ends the process
 with its message and exit code 2. Once it runs, a handler that raises does not end it: the failure
@@ -82,7 +82,7 @@ def run(service_type: type[Service], argv: Sequence[str] | None = None) -> int:
     """Live as a service of `service_type`; return the exit code.
 
     0 after SIGTERM, SIGINT, `--help` or `--print-settings`; 1 where starting failed unexpectedly;
-    2 for a mistake of the user, told in one message on stderr.
+    2 for a mistake of the user, with one message on stderr.
     """
     try:
         settings, print_only = load_settings(service_type.Settings, service_type.name, argv)

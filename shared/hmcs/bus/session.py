@@ -289,7 +289,7 @@ class Bus:
     def watch(self, key: str, handler: Callable[[str, bool], None]) -> None:
         """Call `handler` with each token's key as it comes (True) or goes (False).
 
-        Those already there come first. A token that is only confirmed is not told again; one with
+        Those already there come first. A token that is only confirmed is not new; one with
         an impossible name is refused and counted.
         """
         check_right(self.rights, "watches", key)

@@ -30,7 +30,7 @@ class SettingsError(UserError):
 
 
 class ServiceSettings(BaseSettings):
-    """What every service can be told; a service adds its own fields, with units in their names."""
+    """Settings of every service; a service adds its own fields, with units in their names."""
 
     model_config = SettingsConfigDict(
         env_prefix=ENVIRONMENT_PREFIX,

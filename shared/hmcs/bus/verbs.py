@@ -25,7 +25,7 @@ from hmcs.bus.messages import (
     Outline,
     OutlineQuestion,
     Record,
-    RobotLooks,
+    RobotDescription,
     SetLabels,
     SettingsReport,
     Train,
@@ -88,7 +88,7 @@ LOAD_MODEL = Verb(
 ACTIVATE = Verb(
     "activate", ("fixture_controller",), ActivateRecognizer, Done, "follows that recognizer"
 )
-LOOKS = Verb("looks", ("robot",), Ask, RobotLooks, "what is needed to draw the robot")
+LOOKS = Verb("looks", ("robot",), Ask, RobotDescription, "what is needed to draw the robot")
 STOP = Verb("stop", ("robot",), Ask, Done, "stands until the operator lets go and takes hold again")
 RECORD = Verb("record", ("recorder",), Record, Done, "begins or ends a recording")
 OUTLINE = Verb("outline", ("recorder",), OutlineQuestion, Outline, "the motion in a recording")

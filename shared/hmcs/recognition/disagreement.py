@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hmcs.arrays import Array
+from hmcs.motion.orientation_profile import mean_orientation_profile
 from hmcs.motion.paths import resample
-from hmcs.motion.turns import mean_turns
 from hmcs.recognition.segments import LearningError, Segment
 from hmcs.task import Task
 
@@ -67,7 +67,7 @@ def turn_agreement(segments: Sequence[Segment]) -> TurnAgreement:
     """
     turns = np.stack(
         [
-            mean_turns([segment.positions], [segment.orientations], POINTS)
+            mean_orientation_profile([segment.positions], [segment.orientations], POINTS)
             for segment in segments
             if segment.orientations is not None
         ]

@@ -9,8 +9,8 @@ import numpy as np
 
 from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.orientation_profile import mean_orientation_profile
 from hmcs.motion.paths import mean_path
-from hmcs.motion.turns import mean_turns
 from hmcs.recognition.disagreement import turn_agreement
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import DEFAULT, TrainingData, kind_named
@@ -80,4 +80,4 @@ def _turns(segments: Sequence[Segment]) -> Array | None:
         return None
     alike = [segments[k] for k in turn_agreement(segments).alike]
     orientations = [s.orientations for s in alike if s.orientations is not None]
-    return mean_turns([segment.positions for segment in alike], orientations)
+    return mean_orientation_profile([segment.positions for segment in alike], orientations)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.motion.orientation_profile import OrientationProfile
 from hmcs.motion.paths import Path
-from hmcs.motion.turns import Turns
 from hmcs.task import AXES, Task
 
 
@@ -60,10 +60,10 @@ class Model(NamedTuple):
         return dict(zip(self.gesteme_names, self.path_spreads, strict=True))
 
     @property
-    def turns(self) -> dict[str, Turns]:
+    def turns(self) -> dict[str, OrientationProfile]:
         """How the hand turns along the path of each gesteme that tells."""
         told = zip(self.gesteme_names, self.path_turns, strict=False)
-        return {name: Turns(turns) for name, turns in told if turns is not None}
+        return {name: OrientationProfile(turns) for name, turns in told if turns is not None}
 
 
 def axes_of(task: Task) -> tuple[int, ...]:

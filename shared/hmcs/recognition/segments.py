@@ -34,7 +34,7 @@ class Segment(NamedTuple):
     """One performance of one gesteme."""
 
     demonstration: str
-    """Its name, to be told; two may have the same."""
+    """Its name, for messages; two may have the same."""
     state: int
     """Index of the task state it was performed in."""
     gesteme: int
@@ -49,7 +49,7 @@ class Segment(NamedTuple):
     demonstration_index: int = 0
     """Of the demonstration among all that were cut: what tells one from another."""
 
-    def motion(self, axes: Sequence[int]) -> Motion:
+    def trajectory(self, axes: Sequence[int]) -> Trajectory:
         """Return the motion along these axes, from its own origin."""
         moves = np.array([step.displacement for step in self.steps])[:, list(axes)]
         lengths = np.linalg.norm(moves, axis=1)
@@ -59,10 +59,10 @@ class Segment(NamedTuple):
         if self.after is not None:
             after = self.after[list(axes)]
             passing = passing + after / max(float(np.linalg.norm(after)), 1e-12)
-        return Motion(positions, lengths, directions, passing)
+        return Trajectory(positions, lengths, directions, passing)
 
 
-class Motion(NamedTuple):
+class Trajectory(NamedTuple):
     """A segment's motion along D axes in T steps."""
 
     positions: Array
@@ -172,8 +172,8 @@ def _row(values: Array | None, k: int) -> Array | None:
 
 def _meant(task: Task, label: str, demonstration: Demonstration, sample: int) -> tuple[int, int]:
     """State and gesteme that the label of a sample names."""
-    told = label[:_LONGEST_LABEL]
-    quoted = f"demonstration {demonstration.name!r}: label {told!r}"
+    short_label = label[:_LONGEST_LABEL]
+    quoted = f"demonstration {demonstration.name!r}: label {short_label!r}"
     unquoted = f"demonstration {demonstration.name!r}: its label"
     at = f"at {demonstration.time_s[sample]:.2f} s"
     state_name, _, chosen = label.partition("/")

@@ -1,4 +1,4 @@
-"""Unknown intent: motion that is no part of the task, told by the total likelihood (thesis 4.3).
+"""Unknown intent: motion that is no part of the task, found by the total likelihood (thesis 4.3).
 
 "The total probability drops rapidly when unexpected gestemes are identified": how well the last
 steps fit the task is compared with a threshold learned from demonstrations that the models were

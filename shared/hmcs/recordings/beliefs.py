@@ -11,14 +11,14 @@ import numpy as np
 from hmcs.bus.messages import Belief
 
 
-class Believed(NamedTuple):
+class StepBeliefs(NamedTuple):
     """One step, and what is and was believed after it."""
 
     log_ns: int
     clock: str
     step: int
     sample: int | None
-    """Number of the operator's sample that completed the step; None where it is not told."""
+    """Number of the operator's sample that completed the step; None where it is unknown."""
     replayed: Belief
     recorded: Belief | None
     """Of the recognizer compared with; None where it said nothing of this step."""
@@ -77,7 +77,7 @@ class Packer:
         return self._tuples.setdefault(names, names)
 
 
-class Beliefs(Sequence[Believed]):
+class Beliefs(Sequence[StepBeliefs]):
     """The steps of a replay in their order, with what is and was believed."""
 
     def __init__(self) -> None:
@@ -93,20 +93,20 @@ class Beliefs(Sequence[Believed]):
         recorded: Packed | None,
         label: str | None,
     ) -> None:
-        """Add a step; the arguments are as in `Believed`."""
+        """Add a step; the arguments are as in `StepBeliefs`."""
         self._rows.append((log_ns, intern(clock), step, sample, replayed, recorded, label))
 
     def __len__(self) -> int:
         return len(self._rows)
 
     @overload
-    def __getitem__(self, index: int) -> Believed: ...
+    def __getitem__(self, index: int) -> StepBeliefs: ...
     @overload
-    def __getitem__(self, index: slice) -> tuple[Believed, ...]: ...
-    def __getitem__(self, index: int | slice) -> Believed | tuple[Believed, ...]:
+    def __getitem__(self, index: slice) -> tuple[StepBeliefs, ...]: ...
+    def __getitem__(self, index: int | slice) -> StepBeliefs | tuple[StepBeliefs, ...]:
         """Return steps as they were added."""
         if isinstance(index, slice):
             return tuple(self[number] for number in range(*index.indices(len(self))))
         log_ns, clock, step, sample, replayed, recorded, label = self._rows[index]
         then = None if recorded is None else recorded.belief()
-        return Believed(log_ns, clock, step, sample, replayed.belief(), then, label)
+        return StepBeliefs(log_ns, clock, step, sample, replayed.belief(), then, label)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from hmcs.bus.messages import Belief
 from hmcs.recognition.scoring import changes
-from hmcs.recordings.guiding import Guided
+from hmcs.recordings.fixture_replay import FixtureReplay
 from hmcs.recordings.replaying import Replay
-from hmcs.recordings.ticks import Did
+from hmcs.recordings.ticks import FixtureOutput
 
 COMPARED = ("probabilities", "unknown", "log_likelihood", "mean_log_likelihood", "segment_start")
 """What makes two beliefs the same, bit by bit."""
@@ -129,13 +129,13 @@ def same_bits(one: Belief, other: Belief) -> bool:
     )
 
 
-def fixtures_compared(guided: Guided) -> FixtureComparison:
+def fixtures_compared(fixture_replay: FixtureReplay) -> FixtureComparison:
     """Return how what the fixture would have done stands to what it did."""
     times_ms, apart, moved_apart = array("d"), array("d"), array("d")
     degrees_apart, off_now_mm, off_then_mm = array("d"), array("d"), array("d")
     same_states, both, then_only, now_only = 0, 0, 0, 0
     events = _Events(), _Events()
-    for tick in guided.ticks:
+    for tick in fixture_replay.ticks:
         now, then = tick.now, tick.then
         if then is None:
             continue
@@ -156,7 +156,7 @@ def fixtures_compared(guided: Guided) -> FixtureComparison:
     count = len(apart)
     holds_now, holds_then = (side.takes_hold_ms for side in events)
     goes_now, goes_then = (side.lets_go_ms for side in events)
-    ticks = guided.ticks
+    ticks = fixture_replay.ticks
     lasted_s = (ticks[-1].log_ns - ticks[0].log_ns) / 1e9 if ticks else 0.0
     return FixtureComparison(
         len(ticks),
@@ -177,21 +177,21 @@ def fixtures_compared(guided: Guided) -> FixtureComparison:
         len(goes_then),
         len(goes_now),
         _later_ms(goes_now, goes_then),
-        lasted_s / max(guided.spent_s, 1e-9),
+        lasted_s / max(fixture_replay.spent_s, 1e-9),
     )
 
 
-def rows_of(replay: Replay, guided: Guided) -> Iterator[dict[str, object]]:
+def rows_of(replay: Replay, fixture_replay: FixtureReplay) -> Iterator[dict[str, object]]:
     """Yield a row for every step: what is and was believed, how surely, and how stiff that made it.
 
     Factor and compliance are those of the tick at the sample that completed the step.
     """
     first_ns = replay.beliefs[0].log_ns if replay.beliefs else 0
-    ticks = {(tick.device, tick.sample): number for number, tick in enumerate(guided.ticks)}
+    ticks = {(tick.device, tick.sample): number for number, tick in enumerate(fixture_replay.ticks)}
     for believed in replay.beliefs:
         then = believed.recorded
         number = None if believed.sample is None else ticks.get((believed.clock, believed.sample))
-        tick = None if number is None else guided.ticks[number]
+        tick = None if number is None else fixture_replay.ticks[number]
         now_did, then_did = (None, None) if tick is None else (tick.now, tick.then)
         yield {
             "time_s": (believed.log_ns - first_ns) / 1e9,
@@ -234,7 +234,7 @@ class _Events:
         self.takes_hold_ms, self.lets_go_ms = array("d"), array("d")
         self._guided: bool | None = None
 
-    def take(self, at_ms: float, did: Did) -> None:
+    def take(self, at_ms: float, did: FixtureOutput) -> None:
         """Take in what it does next."""
         if did.engaged and self._guided is not None and did.guides != self._guided:
             (self.takes_hold_ms if did.guides else self.lets_go_ms).append(at_ms)

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hmcs.recordings.plain import NoMessageError
+from hmcs.recordings.json_codec import NoMessageError
 from hmcs.recordings.reading import Recorded, RecordingContent, RecordingError
 from hmcs.whole_files import written_whole
 

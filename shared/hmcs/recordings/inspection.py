@@ -9,7 +9,7 @@ from typing import NamedTuple
 from hmcs.bus.counters import Sequences
 from hmcs.bus.messages import Envelope, Message
 from hmcs.recordings.gaps import Gap
-from hmcs.recordings.plain import NoMessageError, envelope_of, message_of, readable_as
+from hmcs.recordings.json_codec import NoMessageError, envelope_of, message_of, readable_as
 from hmcs.recordings.reading import MODEL_SUFFIX, Recorded, RecordingContent
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from hmcs.plain_numbers import number_in, separator_in
 from hmcs.recordings.fingerprints import Fingerprint, fingerprint_in
-from hmcs.recordings.found import COMMENT
+from hmcs.recordings.generated_marker import COMMENT
 from hmcs.recordings.reading import RecordingError
 from hmcs.recordings.stretches import NS_PER_S, Stretch, to_ns
 

@@ -16,7 +16,7 @@ from typing import Literal
 
 from hmcs.bus.messages import Label, Step
 from hmcs.recordings.fingerprints import fingerprint_of, is_of
-from hmcs.recordings.found import is_as_found, marked
+from hmcs.recordings.generated_marker import is_unchanged_generated, with_generated_marker
 from hmcs.recordings.label_files import MOST_LABELS, LabelFile, labels_text, read_labels
 from hmcs.recordings.reading import RecordingContent, RecordingError
 from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, to_ns, told
@@ -39,7 +39,7 @@ def how_labeled(content: RecordingContent) -> How:
     beside = _written_beside(content)
     if beside is None or _is_of_another(content, beside):
         return "said meanwhile"
-    return "found" if is_as_found(labels_beside(content.path)) else "set afterwards"
+    return "found" if is_unchanged_generated(labels_beside(content.path)) else "set afterwards"
 
 
 def labels_of(content: RecordingContent) -> tuple[Stretch, ...]:
@@ -93,7 +93,9 @@ def write_labels(
         text = labels_text(stretches, content.first_ns, fingerprint_of(content.path))
         aside = _moved_aside(content)
         with written_whole(file) as unfinished:
-            unfinished.write_text(marked(text) if found else text, encoding="utf-8", newline="\n")
+            unfinished.write_text(
+                with_generated_marker(text) if found else text, encoding="utf-8", newline="\n"
+            )
     except OSError as error:
         raise RecordingError(f"{file}: cannot be written: {error.strerror or error}") from error
     return aside

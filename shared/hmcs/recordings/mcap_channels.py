@@ -56,7 +56,7 @@ class Strict(ReadDataStream):
         return data
 
 
-class Told:
+class TextBudget:
     """Counts what is held of a file's own words."""
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Told:
 class Channels:
     """The channels described so far; the first description of a number counts."""
 
-    def __init__(self, told: Told) -> None:
+    def __init__(self, told: TextBudget) -> None:
         self._told = told
         self._schemas: dict[int, str] = {0: ""}
         self._channels: dict[int, Channel] = {}

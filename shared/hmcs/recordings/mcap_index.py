@@ -12,7 +12,7 @@ from mcap import records as mcap
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
-from hmcs.recordings.mcap_channels import Channels, Strict, Told
+from hmcs.recordings.mcap_channels import Channels, Strict, TextBudget
 from hmcs.recordings.mcap_chunks import DamageError, records_in
 from hmcs.recordings.mcap_records import HEAD_BYTES, MAGIC
 
@@ -40,7 +40,7 @@ class Index(NamedTuple):
     """Messages by channel; empty where it does not say."""
 
 
-def index_of(stream: BinaryIO, size: int, told: Told) -> Index | None:
+def index_of(stream: BinaryIO, size: int, told: TextBudget) -> Index | None:
     """Return the index of a file of `size` bytes; None where it has none.
 
     Raises DamageError for one that cannot be used.
@@ -71,7 +71,7 @@ def index_of(stream: BinaryIO, size: int, told: Told) -> Index | None:
         raise DamageError(_DAMAGED) from error
 
 
-def _index(at: int, data: bytes, told: Told) -> Index:
+def _index(at: int, data: bytes, told: TextBudget) -> Index:
     channels, places, counts = Channels(told), array("Q"), {}
     for opcode, begin, end in records_in(data):
         if opcode in _PLACE:

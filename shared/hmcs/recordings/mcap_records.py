@@ -92,7 +92,7 @@ class Record(NamedTuple):
 
 
 class Torn(NamedTuple):
-    """A part of a file in which no record can be told."""
+    """A part of a file in which no record can be read."""
 
     at: int
     end: int

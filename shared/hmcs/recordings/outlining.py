@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.recordings.demonstrations import LEAST_SAMPLES, way_of
+from hmcs.recordings.file_rotation import SUFFIX
 from hmcs.recordings.hands import hand_of
 from hmcs.recordings.labels import labels_beside, labels_of, write_labels
-from hmcs.recordings.parts import SUFFIX
 from hmcs.recordings.reading import RecordingContent, RecordingError
 from hmcs.recordings.stretches import NS_PER_S, check_within, of_seconds
 

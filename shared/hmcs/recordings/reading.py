@@ -21,8 +21,8 @@ from hmcs.bus.messages import Message as BusMessage
 from hmcs.bus.wire import schema_of
 from hmcs.recordings.gaps import Gap
 from hmcs.recordings.in_order import RecordingError, found_in
+from hmcs.recordings.json_codec import Fields, NoMessageError, json_fields, message_of, readable_as
 from hmcs.recordings.mcap_records import MAGIC, RecordFile
-from hmcs.recordings.plain import Fields, NoMessageError, json_fields, message_of, readable_as
 from hmcs.recordings.scan import Scan
 from hmcs.recordings.scanning import scanned
 

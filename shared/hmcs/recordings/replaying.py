@@ -17,10 +17,10 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.recognizer import Precision
 from hmcs.recordings.as_live import AsLive
-from hmcs.recordings.beliefs import Beliefs, Believed, Packed, Packer
+from hmcs.recordings.beliefs import Beliefs, Packed, Packer, StepBeliefs
 from hmcs.recordings.inspection import unread
+from hmcs.recordings.json_codec import NoMessageError, json_fields
 from hmcs.recordings.labels import label_notes, labels_of
-from hmcs.recordings.plain import NoMessageError, json_fields
 from hmcs.recordings.reading import MODEL_SUFFIX, RecordingContent, RecordingError
 from hmcs.recordings.stretches import Stretch
 from hmcs.shown import plain
@@ -37,7 +37,7 @@ class Replay(NamedTuple):
     model: Model
     compared_with: str
     """Name of the recorded recognizer; empty where there is none."""
-    beliefs: Sequence[Believed]
+    beliefs: Sequence[StepBeliefs]
     spent_s: float
     """Processor time."""
     lasted_s: float

@@ -19,7 +19,7 @@ from hmcs.recordings.mcap_channels import (
     Channel,
     Channels,
     Strict,
-    Told,
+    TextBudget,
 )
 from hmcs.recordings.mcap_chunks import (
     LARGEST_CHUNK_BYTES,
@@ -63,7 +63,7 @@ def scanned(stream: BinaryIO, size: int) -> Scan:
 
 class _Scanner:
     def __init__(self, stream: BinaryIO, size: int) -> None:
-        self._told = Told()
+        self._told = TextBudget()
         self._gaps = Gaps()
         self._no_index = ""
         self._index = index = self._index_of(stream, size)
@@ -94,7 +94,7 @@ class _Scanner:
                 if isinstance(record, Record):
                     self._take(record)
                 elif isinstance(record, Torn):
-                    self._gaps.miss("no record can be told there")
+                    self._gaps.miss("no record can be read there")
             except DamageError as error:
                 self._gaps.miss(str(error))
         self._end_loose()

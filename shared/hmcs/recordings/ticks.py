@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Did(NamedTuple):
+class FixtureOutput(NamedTuple):
     """What a fixture does, or did, at one sample of the operator."""
 
     state: str
@@ -42,8 +42,8 @@ class Tick(NamedTuple):
     """Boot of the input device."""
     sample: int
     """Its number."""
-    now: Did
-    then: Did | None
+    now: FixtureOutput
+    then: FixtureOutput | None
     """None where no fixture was recorded to have answered it."""
 
 
@@ -64,7 +64,7 @@ class _Words:
         return self._words[number]
 
 
-class _Dids:
+class _FixtureOutputs:
     """A row for everything that is done."""
 
     def __init__(self, words: _Words) -> None:
@@ -74,7 +74,7 @@ class _Dids:
         self._named = array("L")
         """State, reason, whether engaged: 3 of each."""
 
-    def add(self, did: Did) -> int:
+    def add(self, did: FixtureOutput) -> int:
         """Return the number of the new row."""
         off_m = math.nan if did.off_guide_m is None else did.off_guide_m
         self._numbers.extend((did.factor, did.compliance, *did.direction, *did.velocity, off_m))
@@ -82,10 +82,10 @@ class _Dids:
         self._named.extend((*named, did.engaged))
         return len(self._named) // 3 - 1
 
-    def did(self, row: int) -> Did:
+    def did(self, row: int) -> FixtureOutput:
         factor, compliance, *vectors, off_m = self._numbers[9 * row : 9 * row + 9]
         state, reason, engaged = self._named[3 * row : 3 * row + 3]
-        return Did(
+        return FixtureOutput(
             self._words.word(state),
             self._words.word(reason),
             factor,
@@ -102,21 +102,21 @@ class Ticks(Sequence[Tick]):
 
     def __init__(self) -> None:
         self._words = _Words()
-        self._now, self._then = _Dids(self._words), _Dids(self._words)
+        self._now, self._then = _FixtureOutputs(self._words), _FixtureOutputs(self._words)
         self._log_ns, self._devices = array("q"), array("L")
         self._samples: list[int] = []
         """Numbers that a sender may choose as large as it likes."""
         self._rows_then: dict[tuple[int, int], int] = {}
         """Of what was done, by device and sample."""
 
-    def add(self, log_ns: int, device: str, sample: int, now: Did) -> None:
+    def add(self, log_ns: int, device: str, sample: int, now: FixtureOutput) -> None:
         """Add a sample and what is done at it."""
         self._log_ns.append(log_ns)
         self._devices.append(self._words.number(device))
         self._samples.append(sample)
         self._now.add(now)
 
-    def add_then(self, device: str, sample: int, then: Did) -> None:
+    def add_then(self, device: str, sample: int, then: FixtureOutput) -> None:
         """Note what was done at a sample, whether that was added yet or not."""
         self._rows_then[self._words.number(device), sample] = self._then.add(then)
 

@@ -10,10 +10,10 @@ from typing import IO, Any, cast
 
 from mcap.writer import CompressionType, Writer
 
+from hmcs.recordings.foxglove import SCHEMAS
+from hmcs.recordings.json_codec import BY_SCHEMA, json_schema_of
 from hmcs.recordings.mcap_channels import CHANNEL_TOLD, HMCS
-from hmcs.recordings.plain import BY_SCHEMA, json_schema_of
 from hmcs.recordings.scan import LARGEST_MESSAGE_BYTES
-from hmcs.recordings.well_known import SCHEMAS
 
 PROFILE = "hmcs"
 CHUNK_BYTES = 256 * 1024

@@ -1,4 +1,4 @@
-"""Task files: read with every mistake told, each with its line."""
+"""Task files: read with every mistake reported, each with its line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
 from hmcs.task.fixture_parts import FixtureSetup
-from hmcs.task.model import Draft, Location, Task, contradictions, unknown
+from hmcs.task.model import Draft, Location, Task, contradictions, unknown_name_message
 from hmcs.task.parts import (
     ForbiddenRegion,
     Gesteme,
@@ -231,7 +231,7 @@ def _explain(detail: ErrorDetails) -> tuple[Location, str]:
     if kind == "extra_forbidden":
         model = _model_at(location[:-1])
         choices = list(model.model_fields) if model else []
-        return location, unknown("key", str(location[-1]), choices)
+        return location, unknown_name_message("key", str(location[-1]), choices)
     if kind == "missing":
         model = _model_at(location[:-1])
         about = model.model_fields[str(location[-1])].description if model else None

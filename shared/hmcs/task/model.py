@@ -73,7 +73,7 @@ class Task(Part):
         for state in self.states:
             if state.name == name:
                 return state
-        raise KeyError(unknown("state", name, [state.name for state in self.states]))
+        raise KeyError(unknown_name_message("state", name, [state.name for state in self.states]))
 
 
 class Draft(NamedTuple):
@@ -100,7 +100,7 @@ class Contradiction(NamedTuple):
     message: str
 
 
-def unknown(what: str, name: str, choices: Iterable[str]) -> str:
+def unknown_name_message(what: str, name: str, choices: Iterable[str]) -> str:
     """Return a sentence that says a name is unknown, which is nearest, and what there is."""
     choices = sorted(choices)
     near = get_close_matches(name, choices, n=1)
@@ -149,7 +149,8 @@ def _unknown_names(draft: Draft) -> Iterator[Contradiction]:
         for place, name in enumerate(state.gestemes):
             if name not in gestemes:
                 yield Contradiction(
-                    ("states", index, "gestemes", place), unknown("gesteme", name, gestemes)
+                    ("states", index, "gestemes", place),
+                    unknown_name_message("gesteme", name, gestemes),
                 )
             if name in before:
                 yield Contradiction(
@@ -158,10 +159,12 @@ def _unknown_names(draft: Draft) -> Iterator[Contradiction]:
             before.add(name)
         for name in state.next:
             if name not in states:
-                yield Contradiction(("states", index, "next", name), unknown("state", name, states))
+                yield Contradiction(
+                    ("states", index, "next", name), unknown_name_message("state", name, states)
+                )
     for name in draft.start or ():
         if name not in states:
-            yield Contradiction(("start", name), unknown("state", name, states))
+            yield Contradiction(("start", name), unknown_name_message("state", name, states))
 
 
 def _unreachable(draft: Draft) -> Iterator[Contradiction]:

@@ -45,7 +45,7 @@ def test_one_message_with_any_number_makes_no_later_one_of_the_true_source_late(
         if seq == at:
             sequences.note("key", "boot", forged)
         news.append(sequences.note("key", "boot", seq))
-    # The one that it took the number of cannot be told from it.
+    # The one that it took the number of cannot be distinguished from it.
     assert news.count(None) <= (forged == at)
 
 

@@ -1,4 +1,4 @@
-"""Demonstration files: read back bit by bit, and every mistake told with its line."""
+"""Demonstration files: read back bit by bit, and every mistake reported with its line."""
 
 from __future__ import annotations
 

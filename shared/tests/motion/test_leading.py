@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as arrays
 
 from hmcs.motion.admittance import Admittance
 from hmcs.motion.force_sensing import ForceSensor, Payload, operator_wrench, sensed
-from hmcs.motion.leading import leading_hand
+from hmcs.motion.hand_guiding import hand_guiding_of
 from hmcs.task import load_task
 
 PAYLOAD = Payload(1.5, (0.0, 0.01, 0.05))
@@ -84,8 +84,8 @@ def test_the_sensor_passes_a_steady_force_and_holds_fast_ones_back():
 
 
 def test_only_a_cooperative_task_has_a_hand_on_its_robot():
-    assert leading_hand(load_task("lines-through-obstacles")) is None
-    hand = leading_hand(load_task("object-3d"))
+    assert hand_guiding_of(load_task("lines-through-obstacles")) is None
+    hand = hand_guiding_of(load_task("object-3d"))
     assert hand is not None
     wanted = np.array([0.1, -0.05, 0.0])
     led = [hand.push(wanted, UPRIGHT, 0.01) for _ in range(200)][-1]
@@ -107,7 +107,7 @@ def test_only_a_cooperative_task_has_a_hand_on_its_robot():
     ],
 )
 def test_a_push_that_is_none_moves_nothing_and_leaves_no_trace(velocity, elapsed_s):
-    hand = leading_hand(load_task("object-3d"))
+    hand = hand_guiding_of(load_task("object-3d"))
     assert hand is not None
     wanted = np.array([0.1, -0.05, 0.0])
     for _ in range(200):
@@ -123,7 +123,7 @@ def test_a_push_that_is_none_moves_nothing_and_leaves_no_trace(velocity, elapsed
     st.floats(allow_nan=True, allow_infinity=True),
 )
 def test_whatever_is_wanted_the_hand_pushes_finitely(velocity, elapsed_s):
-    hand = leading_hand(load_task("object-3d"))
+    hand = hand_guiding_of(load_task("object-3d"))
     assert hand is not None
     for _ in range(2):
         led = hand.push(velocity, UPRIGHT, elapsed_s)

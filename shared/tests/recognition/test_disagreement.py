@@ -1,4 +1,4 @@
-"""Demonstrations that disagree wholly are told; sizes, noise and second ways are not."""
+"""Demonstrations that disagree wholly are reported; sizes, noise and second ways are not."""
 
 from __future__ import annotations
 

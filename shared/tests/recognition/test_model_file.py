@@ -1,4 +1,4 @@
-"""Model files come back as they were, and every damage is told."""
+"""Model files come back as they were, and every damage is reported."""
 
 import json
 import zipfile

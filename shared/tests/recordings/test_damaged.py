@@ -1,4 +1,4 @@
-"""A recording that is damaged is read around the damage, and what is missing is told with times."""
+"""A damaged recording is read around the damage, and what is missing is reported with times."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from hmcs.fixtures.controller.rules import Safeguards
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recordings.comparing import compared, fixtures_compared, rows_of
-from hmcs.recordings.guiding import Guided, guided, safeguards_told
+from hmcs.recordings.fixture_replay import FixtureReplay, replay_fixture, safeguards_from
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, replayed
 from support.cells import PERIOD_NS, SETTINGS, Logged, performance, write_cell
@@ -38,18 +38,18 @@ def said(model: Model) -> list[Logged]:
 
 
 @pytest.fixture
-def again(tmp_path: Path, model: Model) -> Callable[..., tuple[Replay, Guided]]:
+def again(tmp_path: Path, model: Model) -> Callable[..., tuple[Replay, FixtureReplay]]:
     """Record what was said, and replay it."""
 
-    def replay(said: list[Logged], **kept: bool) -> tuple[Replay, Guided]:
+    def replay(said: list[Logged], **kept: bool) -> tuple[Replay, FixtureReplay]:
         content = read(write_cell(tmp_path, said, **kept))
         made = replayed(content, model)
-        return made, guided(content, made)
+        return made, replay_fixture(content, made)
 
     return replay
 
 
-Again = Callable[..., tuple[Replay, Guided]]
+Again = Callable[..., tuple[Replay, FixtureReplay]]
 
 
 def test_with_the_same_beliefs_it_does_what_it_did(said: list[Logged], again: Again) -> None:
@@ -86,7 +86,7 @@ def test_an_unsure_recognizer_would_have_let_go(
             for each in sure.beliefs
         )
     )
-    fixture = guided(content, doubting)
+    fixture = replay_fixture(content, doubting)
     doubts_ns = next(each.log_ns for each in doubting.beliefs if each.step == from_step)
     settled = [tick for tick in fixture.ticks if tick.log_ns > doubts_ns + 20 * PERIOD_NS]
     assert {tick.now.factor for tick in settled} == {FREE_FACTOR}
@@ -181,9 +181,9 @@ def test_a_recording_of_steps_alone_has_no_fixture_and_says_so(
 def test_safeguards_are_those_the_recorded_fixture_controller_told(
     said: list[Logged], again: Again
 ) -> None:
-    told = safeguards_told(SETTINGS.model_dump(mode="json"))
+    told = safeguards_from(SETTINGS.model_dump(mode="json"))
     assert told == SETTINGS.safeguards != Safeguards()
-    assert safeguards_told({"settle_ms": "soon", "input_stale_after_ms": 50}) == Safeguards(
+    assert safeguards_from({"settle_ms": "soon", "input_stale_after_ms": 50}) == Safeguards(
         input_stale_after_s=0.05
     )
     _, fixture = again(said, settings_kept=False)

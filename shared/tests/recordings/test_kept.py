@@ -11,7 +11,7 @@ import pytest
 
 from hmcs.recordings.comparing import compared, fixtures_compared
 from hmcs.recordings.demonstrations import demonstrations_of
-from hmcs.recordings.guiding import guided
+from hmcs.recordings.fixture_replay import replay_fixture
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.recordings.replaying import kept_model, replayed
@@ -75,7 +75,7 @@ def test_it_is_replayed_to_the_last_bit(content: RecordingContent) -> None:
         )
     if same_arithmetic():
         assert beliefs.same_bits == 11
-    fixture = fixtures_compared(guided(content, replay))
+    fixture = fixtures_compared(replay_fixture(content, replay))
     assert (fixture.ticks, fixture.compared) == (27, 27)
     assert (fixture.factor_close, fixture.same_state) == (1.0, 1.0)
     assert fixture.factor_apart < 1e-9

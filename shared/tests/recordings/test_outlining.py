@@ -11,7 +11,7 @@ import pytest
 
 from hmcs.bus.messages import Motion
 from hmcs.recordings.demonstrations import demonstrations_of, performances_of, stretches_of
-from hmcs.recordings.found import is_as_found
+from hmcs.recordings.generated_marker import is_unchanged_generated
 from hmcs.recordings.labels import how_labeled, labels_beside, labels_of, write_labels
 from hmcs.recordings.outlining import outlined, recording_named, recordings_in, set_labels
 from hmcs.recordings.reading import RecordingError, read
@@ -167,7 +167,7 @@ def test_found_labels_are_told_from_those_somebody_changed(
 ) -> None:
     path = maker.write(performed(("go", "turn")))
     content, file = read(path), labels_beside(path)
-    assert not is_as_found(file)
+    assert not is_unchanged_generated(file)
     assert how_labeled(content) == "said meanwhile"
     said = labels_of(content)
     write_labels(content, said, found=True)

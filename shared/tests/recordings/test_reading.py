@@ -13,7 +13,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from hmcs.bus.messages import Motion, Step
-from hmcs.recordings import plain
+from hmcs.recordings import json_codec
 from hmcs.recordings.inspection import inspected
 from hmcs.recordings.reading import RecordingError, read
 from support.recordings import KEYS, Maker, Said
@@ -95,7 +95,7 @@ def test_a_recording_of_another_version_of_the_contract_is_told(
     )
     content = read(path)
     monkeypatch.setattr(Motion, "VERSION", 9)
-    monkeypatch.delitem(plain.BY_SCHEMA, "motion/1")
+    monkeypatch.delitem(json_codec.BY_SCHEMA, "motion/1")
     with pytest.raises(RecordingError, match=r"has motion/1, expected motion/9.*version 1\.2\.3"):
         list(content.of(Motion))
 

@@ -17,9 +17,9 @@ from hmcs.recognition.model_file import save_model
 from hmcs.recognition.recognizer import Recognition, StepEvidence
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer, TaskFilter
 from hmcs.recordings.comparing import compared
-from hmcs.recordings.guiding import guided
-from hmcs.recordings.parts import Preface, Recording
-from hmcs.recordings.plain import fields_of
+from hmcs.recordings.file_rotation import Preface, Recording
+from hmcs.recordings.fixture_replay import replay_fixture
+from hmcs.recordings.json_codec import fields_of
 from hmcs.recordings.reading import RecordingError, read
 from hmcs.recordings.replaying import kept_model, recognizer_named, replayed
 from hmcs.translation import belief_message, evidence_message, step_of
@@ -219,8 +219,8 @@ def test_beliefs_of_several_processes_of_one_model_are_compared_once_and_the_com
     assert (replay.compared_with, comparison.degraded) == (model.name, 0)
     assert comparison.same_bits == comparison.steps
     alone = read(write_cell(tmp_path / "alone", rich))
-    expected = guided(alone, replayed(alone, model))
-    factors = [tick.now.factor for tick in guided(content, replay).ticks]
+    expected = replay_fixture(alone, replayed(alone, model))
+    factors = [tick.now.factor for tick in replay_fixture(content, replay).ticks]
     assert factors == [tick.now.factor for tick in expected.ticks]
 
 
@@ -264,7 +264,7 @@ def test_settings_that_cannot_be_read_are_as_if_none_were_kept(
     content = read(recording.path)
     replay = replayed(content, model)
     assert compared(replay).same_bits == len(replay.beliefs)
-    assert len(guided(content, replay).ticks) > 0
+    assert len(replay_fixture(content, replay).ticks) > 0
 
 
 def test_beliefs_without_a_probability_for_each_state_are_compared_with_nothing(

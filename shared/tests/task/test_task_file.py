@@ -1,4 +1,4 @@
-"""Task files: the shipped ones hold together, and every mistake is told with line and field."""
+"""Task files: the shipped ones hold together, and every mistake is reported with line and field."""
 
 from __future__ import annotations
 

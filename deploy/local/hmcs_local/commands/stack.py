@@ -113,7 +113,7 @@ def router(
     ] = None,
     open_to_network: Open = False,
 ) -> None:
-    """Run a router alone, until Ctrl-C. It is reached from this machine only, unless told to."""
+    """Run a router alone, until Ctrl-C. For this machine only, unless options say otherwise."""
     from hmcs.bus.router import main as run_router
 
     words = ["--listen", listen] if listen else []

@@ -41,18 +41,18 @@ def tidy(urdf: str, files: Mapping[str, str]) -> bytes:
     """
     if len(urdf) > _LONGEST_BYTES:
         raise DescriptionError(f"the description has more than {_LONGEST_BYTES} characters")
-    told = _parse(urdf.encode("utf-8", "replace"), _Undeclared())
-    if told.tag != "robot":
-        raise DescriptionError(f"the description is of a {told.tag!r}, expected a robot")
-    links = _links(told)
+    described = _parse(urdf.encode("utf-8", "replace"), _Undeclared())
+    if described.tag != "robot":
+        raise DescriptionError(f"the description is of a {described.tag!r}, expected a robot")
+    links = _links(described)
     robot = Element("robot", name="robot")
-    for material in told.findall("material"):
+    for material in described.findall("material"):
         _copy_material(material, robot)
     for link in links.values():
         own = SubElement(robot, "link", name=link.name)
         for visual in link.told.findall("visual"):
             _copy_visual(visual, own, files)
-    for joint in told.findall("joint"):
+    for joint in described.findall("joint"):
         _copy_joint(joint, robot, links)
     return bytes(ElementTree.tostring(robot, encoding="utf-8"))
 
@@ -115,11 +115,11 @@ class _Link(NamedTuple):
 
 
 def _links(robot: Element) -> Mapping[str, _Link]:
-    told = robot.findall("link")
-    if len(told) > MOST_LINKS:
+    elements = robot.findall("link")
+    if len(elements) > MOST_LINKS:
         raise DescriptionError(f"the robot has more than {MOST_LINKS} links")
-    links = {link.get("name", ""): _Link(f"l{k}", link) for k, link in enumerate(told)}
-    if not told or len(links) < len(told):
+    links = {link.get("name", ""): _Link(f"l{k}", link) for k, link in enumerate(elements)}
+    if not elements or len(links) < len(elements):
         raise DescriptionError("the robot has no links, or two of one name")
     parents: dict[str, str] = {}
     for joint in robot.findall("joint"):
@@ -201,13 +201,13 @@ def _copy_numbers(of: Element, into: Element, tag: str) -> None:
         SubElement(into, tag, kept)
 
 
-def _numbers(told: str, counts: tuple[int, ...]) -> str:
+def _numbers(text: str, counts: tuple[int, ...]) -> str:
     try:
-        numbers = [float(word) for word in told.split()]
+        numbers = [float(word) for word in text.split()]
     except ValueError:
         numbers = []
     if len(numbers) not in counts or not all(
         math.isfinite(number) and abs(number) <= _LARGEST for number in numbers
     ):
-        raise DescriptionError(f"{told[:40]!r} stands where {counts[-1]} numbers are expected")
+        raise DescriptionError(f"{text[:40]!r} stands where {counts[-1]} numbers are expected")
     return " ".join(map(repr, numbers))

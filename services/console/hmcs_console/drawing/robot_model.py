@@ -13,7 +13,7 @@ import yourdfpy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from PIL import Image
 
-from hmcs.bus.messages import RobotLooks
+from hmcs.bus.messages import RobotDescription
 from hmcs.shown import plain
 from hmcs_console.drawing.description import DescriptionError, count_in, tidy
 
@@ -35,19 +35,19 @@ for _library in ("yourdfpy", "trimesh"):
     logging.getLogger(_library).propagate = False
 
 
-def load_robot(looks: RobotLooks) -> yourdfpy.URDF:
+def load_robot(robot_description: RobotDescription) -> yourdfpy.URDF:
     """Return a robot's description with its meshes.
 
     Raises DescriptionError for one that cannot be drawn, and whatever a mesh makes its parser
     raise.
     """
     with tempfile.TemporaryDirectory(prefix="hmcs-robot-") as folder:
-        places = written(looks.files, Path(folder))
+        places = written(robot_description.files, Path(folder))
         meshes = {
             name: place for name, place in places.items() if Path(place).suffix.lower() in _MESHES
         }
         robot = yourdfpy.URDF.load(
-            io.BytesIO(tidy(looks.urdf, meshes)), filename_handler=lambda fname: fname
+            io.BytesIO(tidy(robot_description.urdf, meshes)), filename_handler=lambda fname: fname
         )
     triangles = sum(len(getattr(shape, "faces", ())) for shape in robot.scene.geometry.values())
     if triangles > MOST_TRIANGLES:
@@ -76,9 +76,11 @@ def written(files: Mapping[str, bytes], folder: Path) -> dict[str, str]:
     return names
 
 
-def joints_of(looks: RobotLooks, positions: NDArray[np.float64]) -> dict[str, float]:
-    """Return the position, rad or m, of each joint that was told, by its name."""
-    return dict(zip(looks.joints, positions.tolist(), strict=False))
+def joints_of(
+    robot_description: RobotDescription, positions: NDArray[np.float64]
+) -> dict[str, float]:
+    """Return the position, rad or m, of each reported joint, by its name."""
+    return dict(zip(robot_description.joints, positions.tolist(), strict=False))
 
 
 def _is_file_name(name: str) -> bool:

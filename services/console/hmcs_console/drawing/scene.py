@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from hmcs.bus.messages import FixtureState, RobotLooks, RobotState
+from hmcs.bus.messages import FixtureState, RobotDescription, RobotState
 from hmcs.recognition.model import Model
 from hmcs_console.drawing.drawn_guides import DrawnGuides
 from hmcs_console.drawing.drawn_robot import DrawnRobot
@@ -46,19 +46,19 @@ class Scene:
         self._trails_s = 0.0
         self._direction = self._arrow("/arrows/direction", DIRECTION)
         self._force = self._arrow("/arrows/force", FORCE)
-        self._told: RobotLooks | None = None
-        self._looks: RobotLooks | None = None
+        self._told: RobotDescription | None = None
+        self._robot_description: RobotDescription | None = None
         self._loaded_s = -LOOKS_EVERY_S
         self._robot: DrawnRobot | None = None
 
     def draw(self, picture: Picture, model: Model | None) -> None:
         """Draw a moment, with the guides of the model that is followed."""
         now_s = time.monotonic()
-        if picture.looks is not self._told and now_s - self._loaded_s >= LOOKS_EVERY_S:
-            self._told = picture.looks
-            if picture.looks != self._looks:
+        if picture.robot_description is not self._told and now_s - self._loaded_s >= LOOKS_EVERY_S:
+            self._told = picture.robot_description
+            if picture.robot_description != self._robot_description:
                 self._loaded_s = now_s
-                self._load(picture.looks)
+                self._load(picture.robot_description)
         if picture.robot is not None:
             self._draw_robot(picture.robot)
         self._guides.draw(picture, model)
@@ -67,16 +67,16 @@ class Scene:
             self._trails_s = now_s
             self._draw_trails((picture.robot_trail, picture.hand_trail))
 
-    def _load(self, looks: RobotLooks | None) -> None:
-        self._looks = looks
+    def _load(self, robot_description: RobotDescription | None) -> None:
+        self._robot_description = robot_description
         if self._robot is not None:
             self._robot.remove()
             self._robot = None
-        if looks is None:
+        if robot_description is None:
             return
         try:
             self._server.scene.add_frame("/robot", show_axes=False)
-            self._robot = DrawnRobot(self._server, load_robot(looks), "/robot")
+            self._robot = DrawnRobot(self._server, load_robot(robot_description), "/robot")
         except Exception as error:
             # Whatever a description does to its parsers, the tool is drawn all the same.
             reason = f"{type(error).__name__}: {error}"
@@ -86,9 +86,9 @@ class Scene:
         self._tool.visible = True
         self._tool.position = robot.tool_position
         self._tool.wxyz = wxyz(robot.tool_orientation)
-        if self._robot is None or self._looks is None:
+        if self._robot is None or self._robot_description is None:
             return
-        self._robot.move(joints_of(self._looks, robot.joint_positions))
+        self._robot.move(joints_of(self._robot_description, robot.joint_positions))
 
     def _draw_trails(self, trails: tuple[Pieces, Pieces]) -> None:
         for handle, pieces in zip((self._robot_trail, self._hand_trail), trails, strict=True):

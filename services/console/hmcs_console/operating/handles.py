@@ -119,7 +119,7 @@ class Operating(NamedTuple):
         return "" if self.lease.client is None else operator_of(self.console, self.lease.client)
 
     def handle(self, now_s: float) -> Handle | None:
-        """Return what is to be told while the handle is held; None while it is not."""
+        """Return the handle message to send while the handle is held; None while it is not."""
         if self.lease.client is None or now_s < self.held_from_s:
             return None
         return Handle(
@@ -138,7 +138,7 @@ class Outcome(NamedTuple):
     handles: tuple[Handle, ...] = ()
     """To be published at once."""
     notices: tuple[tuple[int, str], ...] = ()
-    """What pages are to be told."""
+    """Messages to the pages."""
 
 
 def operator_of(console: str, client: int) -> str:
@@ -153,8 +153,8 @@ def after(operating: Operating, event: Event) -> Outcome:
             return _after_grab(operating, event)
         case Moved(client, at_s, position) if leases.holds(operating.lease, client):
             lease = leases.alive(operating.lease, client, at_s)
-            told = led_to(operating.grip, position)
-            return Outcome(operating._replace(lease=lease, position=told))
+            position_sent = led_to(operating.grip, position)
+            return Outcome(operating._replace(lease=lease, position=position_sent))
         case Alive(client, at_s):
             return Outcome(operating._replace(lease=leases.alive(operating.lease, client, at_s)))
         case LetGo(client):
@@ -189,8 +189,8 @@ def waited(operating: Operating, now_s: float, lease_s: float) -> Outcome:
 def _after_grab(operating: Operating, event: Grabbed) -> Outcome:
     lease = leases.grabbed(operating.lease, event.client, event.at_s)
     if not leases.holds(lease, event.client):
-        told = f"{operating.operator} operates: wait until that page lets go"
-        return Outcome(operating, notices=((event.client, told),))
+        notice = f"{operating.operator} operates: wait until that page lets go"
+        return Outcome(operating, notices=((event.client, notice),))
     held = operating._replace(
         lease=lease,
         position=event.position,

@@ -47,8 +47,10 @@ FREE = Rule()
 
 def rule_of(kept_to: str, scale: float) -> Rule:
     """Return the rule a page has chosen; what no page offers is as near to it as there is."""
-    told = scale if np.isfinite(scale) else 1.0
-    return Rule(KEPT_TO.get(kept_to, KEPT_TO[SPACE]), float(min(max(told, SMALLEST), LARGEST)))
+    finite_scale = scale if np.isfinite(scale) else 1.0
+    return Rule(
+        KEPT_TO.get(kept_to, KEPT_TO[SPACE]), float(min(max(finite_scale, SMALLEST), LARGEST))
+    )
 
 
 def led_to(grip: Grip, handle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,10 +59,10 @@ def led_to(grip: Grip, handle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(grip.position + grip.rule.scale * moved)
 
 
-def position_of(told: Any) -> NDArray[np.float64] | None:
+def position_of(value: Any) -> NDArray[np.float64] | None:
     """Return the position a page tells, m, base frame, shape (3,); None where that is none."""
     try:
-        position = np.array(told, dtype=float)
+        position = np.array(value, dtype=float)
     except (TypeError, ValueError):
         return None
     if position.shape != (3,) or not np.all(np.abs(position) <= FARTHEST_M):

@@ -16,7 +16,7 @@ ANSWERS_WITHIN_S = 1.0
 MOST_ASKED = 32
 """So many robots are asked what came of it, all at once; a cell has one or two."""
 _NOT_ASKED = Markdown(
-    "**may still move**: it was told to stand, and is not asked: there are too many"
+    "**may still move**: the stop was sent to it, its answer is not awaited: there are too many"
 )
 
 

@@ -26,7 +26,7 @@ _LONGEST_BOOT = 64
 """Characters, as in messages."""
 
 
-class Told(NamedTuple):
+class MessageHeader(NamedTuple):
     """What is read of every message."""
 
     sender: str
@@ -61,12 +61,12 @@ class Glance(Generic[M]):
         bus.every(EVERY_S, self._look)
 
     def _take(self, arrival: Arrival) -> None:
-        told = told_in(arrival.payload)
-        before = self._waiting.get(told.sender)
+        header = header_of(arrival.payload)
+        before = self._waiting.get(header.sender)
         overwritten = 0 if before is None else before.overwritten + 1
-        self._waiting[told.sender] = arrival._replace(overwritten=overwritten)
-        if told.cause is not None:
-            self._caused(told.cause, arrival.received_ns)
+        self._waiting[header.sender] = arrival._replace(overwritten=overwritten)
+        if header.cause is not None:
+            self._caused(header.cause, arrival.received_ns)
 
     def _look(self) -> None:
         waiting, self._waiting = self._waiting, {}
@@ -76,7 +76,7 @@ class Glance(Generic[M]):
                 self._newest(received)
 
 
-def told_in(payload: bytes) -> Told:
+def header_of(payload: bytes) -> MessageHeader:
     """Return who sent a message, and its cause, without checking the rest of it.
 
     What is no message has no sender and no cause; it is for others to refuse it.
@@ -86,16 +86,16 @@ def told_in(payload: bytes) -> Told:
         sender, origin = fields["source"]["boot"], fields["origin"]
         cause = None if origin is None else (origin["boot"], origin["seq"])
     except (ValueError, TypeError, LookupError, msgpack.UnpackException, RecursionError):
-        return Told("", None)
+        return MessageHeader("", None)
     if not _is_boot(sender) or not (cause is None or _is_cause(cause)):
-        return Told("", None)
-    return Told(sender, cause)
+        return MessageHeader("", None)
+    return MessageHeader(sender, cause)
 
 
-def _is_boot(told: object) -> bool:
-    return isinstance(told, str) and len(told) <= _LONGEST_BOOT
+def _is_boot(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= _LONGEST_BOOT
 
 
-def _is_cause(told: tuple[object, object]) -> bool:
-    boot, seq = told
+def _is_cause(value: tuple[object, object]) -> bool:
+    boot, seq = value
     return _is_boot(boot) and isinstance(seq, int)

@@ -21,7 +21,7 @@ class Row(NamedTuple):
 
     time_s: float
     numbers: Mapping[str, float]
-    """By name; one that nobody told is left out."""
+    """By name; one that no process reported is left out."""
 
 
 Rows = tuple[Row, ...]
@@ -35,7 +35,7 @@ def written(rows: Rows, now_s: float, numbers: Mapping[str, float]) -> Rows:
 def columns(rows: Rows, names: Sequence[str]) -> tuple[NDArray[np.float64], ...]:
     """Return the times, s before the newest row, and a column for each name, shapes (n,).
 
-    What nobody told is not a number. Of no rows there is one of nothing, to have something to draw.
+    What was not reported is NaN. Of no rows there is one of nothing, to have something to draw.
     """
     rows = rows or (Row(0.0, {}),)
     times = np.array([row.time_s for row in rows]) - rows[-1].time_s
@@ -47,15 +47,15 @@ def limits(columns: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
 
     A plot cannot find them by itself where something is not a number.
     """
-    told = np.concatenate([np.zeros(1), *columns])
-    told = told[np.isfinite(told)]
-    lower, upper = float(told.min()), float(told.max())
+    values = np.concatenate([np.zeros(1), *columns])
+    values = values[np.isfinite(values)]
+    lower, upper = float(values.min()), float(values.max())
     rounded = -_round_up(-lower), _round_up(upper)
     return (0.0, 1.0) if rounded[0] == rounded[1] else rounded
 
 
 def _round_up(value: float) -> float:
-    """The next of …, 0.1, 0.2, 0.5, 1, 2, 5, …; 0 for what is too small to be told from it."""
+    """The next of …, 0.1, 0.2, 0.5, 1, 2, 5, …; 0 for what is too small to tell from it."""
     if value < _SMALLEST:
         return 0.0
     value = min(value, _LARGEST)

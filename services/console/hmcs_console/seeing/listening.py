@@ -10,10 +10,10 @@ from hmcs.bus.keys import ANY, Member, is_name, recognizer_in
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import Belief, Evidence, FixtureState, Motion, RobotState, Step
 from hmcs.bus.session import Bus, Received
-from hmcs_console.seeing.gathered import usable
 from hmcs_console.seeing.glancing import Glance
 from hmcs_console.seeing.hops import FAST, SLOW, cause_of
 from hmcs_console.seeing.seen import MOST_RECOGNIZERS, NS_PER_S, Seen
+from hmcs_console.seeing.step_evidence import usable
 
 MOST_STATES = 256
 """Of one belief: no task has so many, and each is drawn."""

@@ -23,7 +23,7 @@ from hmcs.task import Task, load_task
 from hmcs_console.shapes.geometry import Surface, tube
 
 MOST_MODELS, MOST_TOLD, MOST_MISSED = 256, 16, 256
-"""Models that are kept, files that others told of, and hashes of which no file was found."""
+"""Models that are kept, files that others named, and hashes of which no file was found."""
 READ_EVERY_S = 2.0
 """How often files are looked at for a model that is not known."""
 _LONGEST_PATH = 4096
@@ -100,21 +100,21 @@ class Models:
         self._named = {model.name: model for model in models}
         self._hashed = {model.hash: model for model in models}
         self._places = tuple(places)
-        self._told: deque[Path] = deque(maxlen=MOST_TOLD)
+        self._named_files: deque[Path] = deque(maxlen=MOST_TOLD)
         self._missed: deque[str] = deque(maxlen=MOST_MISSED)
         self._read_s = -READ_EVERY_S
 
-    def look_in(self, told: str) -> None:
+    def look_in(self, path: str) -> None:
         """Look in a file, too, which somebody says was written just now."""
-        if plain(told, _LONGEST_PATH) == told and told.endswith(".hmcs"):
-            self._told.append(Path(told))
+        if plain(path, _LONGEST_PATH) == path and path.endswith(".hmcs"):
+            self._named_files.append(Path(path))
             self._missed.clear()
 
     def find(self, recognizer: str, model_hash: str) -> Model | None:
         """Return the model a recognizer stands on, by its hash; None where it is not known here.
 
         A recognizer of another name may stand on any model, so its name counts only as long as it
-        has told no hash, which is empty then.
+        has reported no hash, which is empty then.
         """
         if not model_hash:
             return self._named.get(recognizer)
@@ -135,7 +135,7 @@ class Models:
         return self._hashed.get(model_hash)
 
     def _read_files(self) -> None:
-        for place in (*self._places, *self._told):
+        for place in (*self._places, *self._named_files):
             # Paths are given as another process sees them, and files may be half written.
             with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):
                 for file in model_files(place):

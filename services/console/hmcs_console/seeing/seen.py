@@ -13,17 +13,17 @@ from hmcs.bus.messages import (
     FixtureState,
     Health,
     Motion,
-    RobotLooks,
+    RobotDescription,
     RobotState,
     Step,
     TrainingProgress,
 )
 from hmcs.recognizer_takeover import Agreement, Shadows
-from hmcs_console.seeing.gathered import Gathered, beneath, gathered
 from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.runners import Runners
+from hmcs_console.seeing.step_evidence import StepEvidence, evidence_of, with_evidence
 from hmcs_console.seeing.takes import Take
 from hmcs_console.seeing.trails import Points, Trail
 from hmcs_console.shapes.palette import UNKNOWN, Color, color_of
@@ -62,9 +62,9 @@ class Picture(NamedTuple):
     """The last half minute in numbers."""
     states: tuple[str, ...]
     """Of the task, as they are colored."""
-    looks: RobotLooks | None
+    robot_description: RobotDescription | None
     health: dict[Member, Health | None]
-    """Of every process that is there; None where it has not told."""
+    """Of every process that is there; None where it has not reported."""
     training: TrainingProgress | None
     marking: Marking
     """The part of the task the hand is said to be in."""
@@ -91,7 +91,7 @@ class Seen:
         self.step: Step | None = None
         self.clock = ""
         """Boot of the input device whose steps are heard."""
-        self.looks: RobotLooks | None = None
+        self.robot_description: RobotDescription | None = None
         self.members: set[Member] = set()
         self.health: dict[Member, Health] = {}
         self.training: TrainingProgress | None = None
@@ -102,7 +102,7 @@ class Seen:
         self._robot: tuple[float, RobotState] | None = None
         self._fixture: tuple[float, FixtureState] | None = None
         self._beliefs: dict[str, tuple[float, Belief]] = {}
-        self._evidence: dict[str, Gathered] = {}
+        self._evidence: dict[str, StepEvidence] = {}
         self._fast, self._slow = Arrivals(FAST), Arrivals(SLOW)
         self._shadows = Shadows()
         self.runners = Runners()
@@ -169,8 +169,8 @@ class Seen:
         """Take in what a classifier makes of a step, for a recognizer that is heard."""
         if recognizer not in self._beliefs and len(self._evidence) >= MOST_RECOGNIZERS:
             return
-        known = self._evidence.get(recognizer, Gathered())
-        self._evidence[recognizer] = gathered(known, evidence)
+        known = self._evidence.get(recognizer, StepEvidence())
+        self._evidence[recognizer] = with_evidence(known, evidence)
 
     def in_fast_loop(self, stage: int, cause: Cause, at_ns: int) -> None:
         """Take in when a message of a stage of the fast loop came, monotonic ns."""
@@ -216,7 +216,7 @@ class Seen:
             robot=_fresh(self._robot, now_s),
             fixture=_fresh(self._fixture, now_s),
             belief=belief,
-            evidence=() if belief is None or known is None else beneath(belief, known),
+            evidence=() if belief is None or known is None else evidence_of(belief, known),
             active=active,
             recognizers=self._shadows.recognizers,
             agreement=self._shadows.agreement(active),
@@ -224,7 +224,7 @@ class Seen:
             hand_trail=self._hand_trail.pieces,
             rows=self._rows,
             states=self.states,
-            looks=self.looks,
+            robot_description=self.robot_description,
             health={member: self.health.get(member) for member in sorted(self.members)},
             training=self.training,
             marking=self.marking,

@@ -81,10 +81,10 @@ def request_for_socket(head: Head, port: int) -> bytes:
     return "\r\n".join([*lines, "", ""]).encode()
 
 
-def _is_key(told: str) -> bool:
-    if not _KEY.fullmatch(told):
+def _is_key(key: str) -> bool:
+    if not _KEY.fullmatch(key):
         return False
     try:
-        return len(base64.b64decode(told, validate=True)) == 16
+        return len(base64.b64decode(key, validate=True)) == 16
     except binascii.Error:
         return False

@@ -216,8 +216,8 @@ class Gateway:
         verdict = self._admission.judge(head, address, self._loop.time())
         if verdict.status is not None or head is None:
             if verdict.wrong_tokens:
-                told = f"wrong token number {verdict.wrong_tokens} of its address"
-                self._turn_away("token", "a browser is not let in", address, told)
+                reason = f"wrong token number {verdict.wrong_tokens} of its address"
+                self._turn_away("token", "a browser is not let in", address, reason)
             status = verdict.status or 400
             await _send(writer, answer(status, verdict.reason, verdict.headers))
         elif asks_for_socket(head):

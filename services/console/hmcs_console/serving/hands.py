@@ -36,7 +36,7 @@ class Hands:
         self._stopped = stopped
         self._handles = bus.publisher(Handle, bus.keys.handle)
         self._flooding: set[int] = set()
-        """Pages that were told that they do too much."""
+        """Pages that were warned that they send too much."""
         self.operating = Operating(bus.source.instance)
         """How the pages operate now."""
 

@@ -25,7 +25,7 @@ Press = Callable[[], None]
 _presser: ContextVar[int | None] = ContextVar("presser", default=None)
 
 
-class Taken(NamedTuple):
+class PageEvents(NamedTuple):
     """What pages did since the last time."""
 
     events: tuple[Event | Press, ...]
@@ -59,10 +59,10 @@ class Inbox:
                 case _:
                     self._dropped[client] += 1
 
-    def take(self) -> Taken:
+    def take(self) -> PageEvents:
         """Take what there is."""
         with self._lock:
-            taken = Taken(tuple(self._events), dict(self._dropped))
+            taken = PageEvents(tuple(self._events), dict(self._dropped))
             self._clear()
         return taken
 

@@ -37,7 +37,7 @@ from hmcs_console.operating.rules import (
     position_of,
     rule_of,
 )
-from hmcs_console.serving.inbox import Inbox, Press, Taken
+from hmcs_console.serving.inbox import Inbox, PageEvents, Press
 from hmcs_console.serving.server import Server
 from hmcs_console.serving.writing import notify
 
@@ -92,7 +92,7 @@ class Page:
         """Put down what a viewer did, or is to be done for it; from any thread."""
         self._inbox.put(event)
 
-    def take_events(self) -> Taken:
+    def take_events(self) -> PageEvents:
         """Take what viewers did since the last time."""
         return self._inbox.take()
 
@@ -105,7 +105,7 @@ class Page:
         """Let the handles nobody holds follow the tool, m, shape (3,)."""
         self._handle_at = position
         for client, handle in list(self._handles.items()):
-            # A page that is gone cannot be drawn to; and one may have told anything of its handle.
+            # A page that is gone cannot be drawn to; and one may have sent any pose.
             with contextlib.suppress(RuntimeError, ValueError, TypeError):
                 if client != holder and not np.allclose(handle.position, position, atol=1e-4):
                     handle.position = position

@@ -1,4 +1,4 @@
-"""Where the page may be opened: addresses and names, told apart by what they are, not by letters.
+"""Where the page may be opened: addresses and names, compared by what they mean, not by letters.
 
 A name that somebody else controls may lead to this machine at any time (DNS rebinding), and a page
 that was opened under it would belong to the one who does. An address belongs to nobody, so it is
@@ -83,9 +83,9 @@ def is_name(host: str) -> bool:
     return _NAME.fullmatch(host.lower()) is not None and address_of(host) is None
 
 
-def place_of(told: str) -> Place | None:
+def place_of(address: str) -> Place | None:
     """Return the place a `Host` header names; None where it names none."""
-    found = _PLACE.fullmatch(told.lower())
+    found = _PLACE.fullmatch(address.lower())
     if found is None:
         return None
     host, port = found[1].strip("[]"), found[2]

@@ -28,14 +28,14 @@ class Server(viser.ViserServer):
     def __init__(self, log: logging.Logger) -> None:
         with _quietly():
             super().__init__(host="127.0.0.1", port=0, label="HMCS", verbose=False)
-        self._told = _Told(RateLimitedLog(log))
+        self._library_log = _LibraryLog(RateLimitedLog(log))
         library = logging.getLogger(_LIBRARY_LOG)
-        library.addHandler(self._told)
+        library.addHandler(self._library_log)
         library.propagate = False
         self._expected: set[int] = set()
         self._websock_server.on_client_connect(self._turn_strangers_away)
         loop = self.get_event_loop()
-        loop.call_soon_threadsafe(loop.set_exception_handler, self._told.failed)
+        loop.call_soon_threadsafe(loop.set_exception_handler, self._library_log.failed)
 
     @contextlib.contextmanager
     def expects(self, port: int) -> Iterator[None]:
@@ -58,12 +58,12 @@ class Server(viser.ViserServer):
 
     def stop(self) -> None:
         """End, with all its threads."""
-        logging.getLogger(_LIBRARY_LOG).removeHandler(self._told)
+        logging.getLogger(_LIBRARY_LOG).removeHandler(self._library_log)
         with _quietly():
             super().stop()
 
 
-class _Told(logging.Handler):
+class _LibraryLog(logging.Handler):
     """Hands on what the library says, and what fails in its tasks."""
 
     def __init__(self, seldom: RateLimitedLog) -> None:

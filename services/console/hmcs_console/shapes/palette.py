@@ -15,7 +15,7 @@ DIRECTION: Color = (35, 139, 69)
 FORCE: Color = (230, 85, 13)
 FASTER: Color = (31, 119, 180)
 SLOWER: Color = (214, 39, 40)
-# Okabe and Ito (2008): told apart with every kind of color vision.
+# Okabe and Ito (2008): distinct for every kind of color vision.
 _STATES: tuple[Color, ...] = (
     (0, 114, 178),
     (230, 159, 0),

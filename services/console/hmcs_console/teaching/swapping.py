@@ -11,14 +11,14 @@ from hmcs_console.seeing.seen import Seen
 from hmcs_console.teaching import takeover
 from hmcs_console.teaching.takeover import Advance, Followed, Takeover
 
-Told = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 class Swapping:
     """Carries takeovers out, one at a time; called on the bus' own thread."""
 
     def __init__(
-        self, seen: Seen, request: Callable[[Question, Told, Told], None], compare_s: float
+        self, seen: Seen, request: Callable[[Question, Notify, Notify], None], compare_s: float
     ) -> None:
         """Ask with `request`: of a question, what to call with its answer, and what to call with
         the reason why it was not carried out."""

@@ -37,7 +37,7 @@ class Explained:
             self._model = model
             self._paths = {} if model is None else model.paths
         task = None if model is None else model.task
-        told = reasons_of(picture.belief, picture.evidence, picture.fixture, task, self._paths)
+        reasons = reasons_of(picture.belief, picture.evidence, picture.fixture, task, self._paths)
         state = "" if picture.fixture is None else picture.fixture.state
-        write(self._reasons, spoken_reasons.reasons(told))
+        write(self._reasons, spoken_reasons.reasons(reasons))
         write(self._rules, spoken_rules.rules(task, state))

@@ -1,7 +1,7 @@
-"""Why a state is held likely, and what would change that: what can be told of it in numbers.
+"""Why a state is held likely, and what would change that: what numbers show of it.
 
 Of evidence only what stands in messages counts, of directions only what learned paths say. What
-nobody told is left out.
+no process reported is left out.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def reasons_of(
     task: Task | None,
     paths: Mapping[str, Path],
 ) -> Reasons | None:
-    """Return what can be told; None where nothing is believed, or not of this task.
+    """Return what is known; None where there is no belief, or none of this task.
 
     `evidence` is what classifiers made of the step of the belief, each of the gestemes it holds;
     `paths` are the learned ones by gesteme, m of the hand.
@@ -110,13 +110,13 @@ def log_ratio(
     The latter is None where it holds it, but not with that beginning any more.
     """
     held = False
-    for told in evidence:
-        if gesteme in told.gestemes:
+    for heard in evidence:
+        if gesteme in heard.gestemes:
             held = True
-            index = told.gestemes.index(gesteme)
-            found = np.flatnonzero((told.pair_gesteme == index) & (told.pair_start == start))
+            index = heard.gestemes.index(gesteme)
+            found = np.flatnonzero((heard.pair_gesteme == index) & (heard.pair_start == start))
             if len(found):
-                return True, float(told.log_ratio[found[0]])
+                return True, float(heard.log_ratio[found[0]])
     return held, None
 
 

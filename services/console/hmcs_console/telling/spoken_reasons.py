@@ -9,7 +9,7 @@ from hmcs.shown import Markdown
 from hmcs_console.telling.reasons import Reasons, Rival, Support
 
 _STRAIGHT_RAD = np.radians(5.0)
-"""A smaller turn is none that a hand could be told to make."""
+"""No hand could follow advice to make a smaller turn."""
 _COUNTS = 0.38
 """An axis is named that has at least so much of a direction: one less than 22.5° from the next."""
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
@@ -39,19 +39,19 @@ def side(direction: NDArray[np.float64]) -> str:
     return f"{' and '.join(reversed(named))} (toward {sign}{'xyz'[axis]})"
 
 
-def _along(told: Reasons) -> Markdown:
-    if told.progress is None or told.left_m is None:
+def _along(reasons: Reasons) -> Markdown:
+    if reasons.progress is None or reasons.left_m is None:
         return Markdown("")
     return Markdown("{:.0%} along {}'s path, {:.0f} mm to go").format(
-        told.progress, told.likely, told.left_m * 1e3
+        reasons.progress, reasons.likely, reasons.left_m * 1e3
     )
 
 
-def _supported(told: Reasons) -> Markdown:
-    if not told.support:
+def _supported(reasons: Reasons) -> Markdown:
+    if not reasons.support:
         return Markdown("")
     return Markdown("Newest step, against the background: {}").format(
-        Markdown(", ").join(map(_support, told.support))
+        Markdown(", ").join(map(_support, reasons.support))
     )
 
 
@@ -64,10 +64,10 @@ def _support(support: Support) -> Markdown:
     return Markdown("{} {:+.2f} nats").format(name, support.log_ratio_nats)
 
 
-def _changing(told: Reasons) -> Markdown:
-    if not told.rivals:
+def _changing(reasons: Reasons) -> Markdown:
+    if not reasons.rivals:
         return Markdown("")
-    lines = [Markdown("- {}").format(_rival(rival)) for rival in told.rivals]
+    lines = [Markdown("- {}").format(_rival(rival)) for rival in reasons.rivals]
     head = [Markdown("What would change its mind:"), Markdown("")]
     return Markdown("\n").join([*head, *lines])
 

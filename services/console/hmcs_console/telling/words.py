@@ -27,9 +27,9 @@ _REASONS = {
 
 def several(names: Sequence[str]) -> Markdown:
     """Return names, the first of many, with how many more there are."""
-    told = Markdown(", ").join(names[:MOST_NAMES])
+    listed = Markdown(", ").join(names[:MOST_NAMES])
     more = len(names) - MOST_NAMES
-    return Markdown("{} and {} more").format(told, more) if more > 0 else told
+    return Markdown("{} and {} more").format(listed, more) if more > 0 else listed
 
 
 def why(belief: Belief | None) -> Markdown:
@@ -100,18 +100,18 @@ def operating() -> Markdown:
 
 def services(health: Mapping[Member, Health | None], unrun: str = "") -> Markdown:
     """Return how every process is that is there, and which recognizer is followed unrun."""
-    told = [_process(member, how) for member, how in health.items()]
+    lines = [_process(member, how) for member, how in health.items()]
     if unrun:
-        told.insert(0, Markdown("**The fixture follows {}, which nobody runs.**").format(unrun))
-    return _PARAGRAPHS.join(told) if told else Markdown("Nobody is there.")
+        lines.insert(0, Markdown("**The fixture follows {}, which nobody runs.**").format(unrun))
+    return _PARAGRAPHS.join(lines) if lines else Markdown("Nobody is there.")
 
 
 def training(progress: TrainingProgress | None) -> Markdown:
     """Return how far a training is."""
     if progress is None:
         return Markdown("No training was heard of.")
-    told = Markdown("**{}** {}: {}").format(progress.model, progress.stage, progress.detail)
-    return _LINES.join([told, progress.path]) if progress.path else told
+    text = Markdown("**{}** {}: {}").format(progress.model, progress.stage, progress.detail)
+    return _LINES.join([text, progress.path]) if progress.path else text
 
 
 def marking(now: Marking) -> Markdown:
@@ -122,8 +122,8 @@ def marking(now: Marking) -> Markdown:
     if not now.by_pedal:
         return marked
     if now.order is None:
-        told = Markdown("{}; which part is next nobody knows: give the console a task")
-        return told.format(marked)
+        text = Markdown("{}; which part is next nobody knows: give the console a task")
+        return text.format(marked)
     if not now.next:
         return Markdown("{}; the pedal (key P) ends the task").format(marked)
     return Markdown("{}; the pedal (key P) begins **{}**").format(marked, now.next)
@@ -168,18 +168,18 @@ def _standing(robot: RobotState) -> Markdown:
     return Markdown("follows")
 
 
-def _process(member: Member, told: Health | None) -> Markdown:
+def _process(member: Member, health: Health | None) -> Markdown:
     name = Markdown("**{}** {}").format(*member)
-    if told is None:
-        return _LINES.join([name, Markdown("has not told how it is")])
+    if health is None:
+        return _LINES.join([name, Markdown("has not reported its health")])
     lost, late, refused = (
-        sum(counted.values()) for counted in (told.lost, told.late, told.refused)
+        sum(counted.values()) for counted in (health.lost, health.late, health.refused)
     )
-    how = Markdown("{}") if told.healthy else Markdown("**unhealthy**: {}")
+    how = Markdown("{}") if health.healthy else Markdown("**unhealthy**: {}")
     return _LINES.join(
         [
-            Markdown("{}, {:.0f} Hz").format(name, told.loop_rate_hz),
-            how.format(told.detail),
+            Markdown("{}, {:.0f} Hz").format(name, health.loop_rate_hz),
+            how.format(health.detail),
             Markdown("lost {}, late {}, refused {}").format(lost, late, refused),
         ]
     )

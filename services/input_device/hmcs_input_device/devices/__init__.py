@@ -1,1 +1,1 @@
-"""Devices a hand moves: each told alike, and made the motion of a hand by one mapping."""
+"""Devices a hand moves: read into one form, then mapped to the motion of a hand by one mapping."""

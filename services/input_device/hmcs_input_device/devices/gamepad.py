@@ -68,7 +68,7 @@ class Gamepad:
         """Return how it is now; raises UnpluggedError while it is gone."""
         self._pygame.event.clear()
         if self._pad is None or not self._pad.attached():
-            # Told once even where the next one is there already: its dead-man is another.
+            # Reported once even where the next one is there already: its dead-man is another.
             was, self._pad = self._pad, self._first()
             if was is not None or self._pad is None:
                 raise UnpluggedError(

@@ -18,7 +18,7 @@ from hmcs.fixtures.controller.rules import Rules, Safeguards
 from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.motion.closed_loop_operators import ClosedLoopOperator
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.leading import leading_hand
+from hmcs.motion.hand_guiding import hand_guiding_of
 from hmcs.motion.steps import DeadZone, Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
@@ -74,7 +74,7 @@ def perform(
 
     Where the task is cooperative the hand is on the robot's tool and pushes it.
     """
-    leading = leading_hand(model.task)
+    hand_guiding = hand_guiding_of(model.task)
     controller = Controller(Safeguards())
     guides = Guides(model.paths, rules, regions_of(model.task), model.spreads, model.turns)
     controller.load(model.name, guides)
@@ -95,11 +95,14 @@ def perform(
         if motion.arrived:
             arrived = True
             break
-        if leading is None:
+        if hand_guiding is None:
             hand = hand + motion.velocity * period_s
             twist = np.concatenate([motion.velocity, np.zeros(3)])
         else:
-            hand, twist = tool, leading.push(motion.velocity, robot.orientation, period_s).twist
+            hand, twist = (
+                tool,
+                hand_guiding.push(motion.velocity, robot.orientation, period_s).twist,
+            )
         fixture = controller.on_sample(
             now_s, OperatorSample(tick, hand, twist, dead_man=True, clutch=False)
         )

@@ -16,7 +16,7 @@ import numpy as np
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import Task
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 
 ENTRY_POINTS = "hmcs.simulated_robots"
 LAG = "lag"
@@ -84,6 +84,6 @@ def robot_of(task: Task, name: str, lag_s: float) -> SimulatedRobot:
         return LaggingTool(np.array(start), np.array(turned), lag_s)
     others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     if name not in others:
-        raise UserError(unknown("robot", name, [LAG, *others]))
+        raise UserError(unknown_name_message("robot", name, [LAG, *others]))
     made: SimulatedRobot = others[name].load()(task)
     return made

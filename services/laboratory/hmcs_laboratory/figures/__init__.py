@@ -1,1 +1,1 @@
-"""The figures of the thesis, made anew: drawn, and told with the numbers of what is drawn."""
+"""The figures of the thesis, made anew: drawn, with the numbers of what is drawn."""

@@ -47,14 +47,14 @@ def worth_of_assistance(settings: AssistanceFigureSettings, rng: np.random.Gener
         min(_measured(rows, task), key=lambda row: _number(row["error_ratio"]))
         for task in _tasks(rows)
     ]
-    told = ", ".join(
+    worth = ", ".join(
         f"{_TITLES[str(row['task'])]}: {row['law']} ({_number(row['error_ratio']):.2f})"
         for row in best
     )
     return Drawn(
         picture_of(rows),
         numbers,
-        f"Down and to the left is better. The least error: {told}.",
+        f"Down and to the left is better. The least error: {worth}.",
         "The thesis has no such comparison.",
     )
 

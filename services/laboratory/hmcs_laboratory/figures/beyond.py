@@ -101,14 +101,14 @@ def reliability_diagram(settings: ReliabilitySettings, rng: np.random.Generator)
     labels.append("as often as said")
     picture.legend(handles, labels, loc="outside lower center", ncols=len(handles))
     numbers: dict[str, Number] = {"noise": list(settings.noise)}
-    told = []
+    lines = []
     for method, name in _NAMES.items():
         errors = [judged[method, noise].error for noise in settings.noise]
         numbers[f"{method}_calibration_error"] = errors
-        told.append(f"{name} {', '.join(f'{error:.3f}' for error in errors)}")
+        lines.append(f"{name} {', '.join(f'{error:.3f}' for error in errors)}")
     values = " and ".join(f"{noise:g}" for noise in settings.noise)
     found = (
-        f"Expected calibration error, {BINS} bins, at κ = {values}: {'; '.join(told)}. Steps of "
+        f"Expected calibration error, {BINS} bins, at κ = {values}: {'; '.join(lines)}. Steps of "
         f"{settings.performances} performances of each of {counted(settings.tasks, 'task')}; a "
         "point is drawn where a bin holds 20 steps at least."
     )
@@ -127,12 +127,12 @@ def unknown_intent(settings: UnknownFigureSettings, rng: np.random.Generator) ->
     other = steps_of(other_drawings(known, settings.unknown_shapes, leaving), zone_m)
     steps = (*performance.steps[:half], *after(performance.steps[:half], tuple(other)))
     recognizer = recognizer_of(model)
-    told = [recognizer.step(step) for step in steps]
+    recognitions = [recognizer.step(step) for step in steps]
     watched = _Watched(
-        np.array([each.belief.states for each in told]),
-        np.array([each.belief.unknown for each in told]),
-        np.array([each.mean_log_likelihood for each in told]),
-        np.array([each.unknown_alarm for each in told]),
+        np.array([each.belief.states for each in recognitions]),
+        np.array([each.belief.unknown for each in recognitions]),
+        np.array([each.mean_log_likelihood for each in recognitions]),
+        np.array([each.unknown_alarm for each in recognitions]),
     )
     alarm = segment_filter_model(model).alarm
     picture = new_picture(6.4)
@@ -233,14 +233,16 @@ def _judged(
     return judged
 
 
-def _draw_reliability(above: Axes, below: Axes, told: Reliability, index: int, label: str) -> None:
-    shares = told.counts / told.counts.sum()
-    enough = told.counts >= 20
+def _draw_reliability(
+    above: Axes, below: Axes, reliability: Reliability, index: int, label: str
+) -> None:
+    shares = reliability.counts / reliability.counts.sum()
+    enough = reliability.counts >= 20
     style: dict[str, Any] = {
         "color": color_of(index),
         "marker": mark_of(index),
         "linewidth": 1.4,
     }
-    above.plot(told.said[enough], told.came_true[enough], label=label, ms=5, **style)
-    filled = told.counts > 0
-    below.plot(told.said[filled], shares[filled], ms=3, **style)
+    above.plot(reliability.said[enough], reliability.came_true[enough], label=label, ms=5, **style)
+    filled = reliability.counts > 0
+    below.plot(reliability.said[filled], shares[filled], ms=3, **style)

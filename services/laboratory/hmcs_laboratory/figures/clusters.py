@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from pydantic import Field
 
 from hmcs.arrays import Array
-from hmcs_baselines.clustering import k_means
-from hmcs_baselines.elbow import (
+from hmcs_baselines.cluster_count import (
     ClusterSearch,
     CusumSettings,
     Elbow,
     cusum_elbow,
     search_clusters,
 )
+from hmcs_baselines.clustering import k_means
 from hmcs_laboratory.data.hands import Count, NotNegative, Positive
 from hmcs_laboratory.figures.drawing import (
     FAINT,
@@ -104,9 +104,9 @@ def cluster_centers(settings: CentersSettings, rng: np.random.Generator) -> Draw
         "clusters": list(settings.clusters),
         "mean_distance": distances,
     }
-    told = [f"{d:.3f} with {k}" for d, k in zip(distances, settings.clusters, strict=True)]
+    errors = [f"{d:.3f} with {k}" for d, k in zip(distances, settings.clusters, strict=True)]
     found_text = (
-        f"The mean distance of the {len(vectors)} vectors to their center is {listed(told)} "
+        f"The mean distance of the {len(vectors)} vectors to their center is {listed(errors)} "
         "clusters. Large filled marks are the centers; they lie inside the circle, as means of "
         "unit vectors do."
     )

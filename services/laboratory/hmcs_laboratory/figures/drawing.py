@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
-"""Told apart by all kinds of color vision; states beyond them begin again, with other marks."""
+"""Distinct for all kinds of color vision; states beyond them begin again, with other marks."""
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h")
 METHOD_COLORS = {
     "od-hmm": COLORS[0],

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, shapes
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 from hmcs_baselines.clustering import assign
 from hmcs_baselines.direction_states import (
     DirectionStates,
@@ -55,7 +55,7 @@ NEAR_STEPS = 5
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if name not in shapes():
-            raise ValueError(unknown("shape", name, shapes()))
+            raise ValueError(unknown_name_message("shape", name, shapes()))
     return names
 
 

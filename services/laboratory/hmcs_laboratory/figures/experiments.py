@@ -244,9 +244,9 @@ def _experiments(settings: ExperimentSettings, rng: np.random.Generator) -> _Exp
 
 def _draw_states(ax: Axes, positions: Array, states: list[str], names: tuple[str, ...]) -> None:
     ax.plot(*positions.T, color=FAINT, linewidth=0.7)
-    told = np.array(states)
+    believed = np.array(states)
     for k, name in enumerate(names):
-        own = positions[::_EVERY][told[::_EVERY] == name]
+        own = positions[::_EVERY][believed[::_EVERY] == name]
         if len(own):
             ax.plot(*own.T, color=color_of(k), marker=mark_of(k), ms=4, linestyle="")
 

@@ -170,8 +170,8 @@ def _findings(made: Sequence[Made], fast: bool, seed: int) -> str:
         }
         for each in made
     }
-    told = {"seed": seed, "fast": fast, "versions": versions(), "figures": figures}
-    return json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    findings = {"seed": seed, "fast": fast, "versions": versions(), "figures": figures}
+    return json.dumps(findings, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _umask() -> int:

@@ -121,7 +121,7 @@ def line_states(settings: LinesSettings, rng: np.random.Generator) -> Drawn:
         f"{len(performance.steps)} steps shown are in the right state, "
         f"{100 * np.mean(right_steps):.1f} % in {len(right_steps)} performances. In "
         f"{numbers['repeats_number_right']} of {len(others)} other tasks each line had one state, "
-        f"in {numbers['repeats_order_right']} π and A told the right order."
+        f"in {numbers['repeats_order_right']} π and A showed the right order."
     )
     differs = (
         "The lines are drawn by lot. How noisy the thesis' hand was in this example, and how long "

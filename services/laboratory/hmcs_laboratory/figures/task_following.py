@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import recognizer_of
-from hmcs_baselines.classifying import GestemeClassifier
+from hmcs_baselines.classifying import GestemeHmmClassifier
 from hmcs_baselines.two_levels import TwoLevels
 from hmcs_laboratory.data.tasks import Performance, TaskSet
 
@@ -67,7 +67,9 @@ def follow(model: Model, performance: Performance) -> Followed:
     """Follow a performance by a layered HMM that is restarted at its true changes."""
     knowledge: TwoLevels = model.knowledge
     recognizer = recognizer_of(model)
-    gestemes = GestemeClassifier(knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum)
+    gestemes = GestemeHmmClassifier(
+        knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum
+    )
     beliefs = [recognizer.step(step).belief for step in performance.steps]
     classified = np.array([gestemes.step(step).gestemes for step in performance.steps])
     states = np.array([belief.states for belief in beliefs])

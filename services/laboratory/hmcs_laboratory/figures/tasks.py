@@ -31,7 +31,7 @@ from hmcs_laboratory.figures.trajectories import TaskFigureSettings
 from hmcs_laboratory.study import StudySettings
 
 
-class LayeredSettings(StudySettings):
+class LayeredHmmFigureSettings(StudySettings):
     """Of the layered HMM."""
 
     symbols: Count = 25
@@ -47,8 +47,8 @@ class LayeredSettings(StudySettings):
     eager_any_state: Share = 1e-3
     """The same in a second layered HMM, which is measured but not drawn."""
 
-    def layered(self, any_state: float) -> LayeredHmmSettings:
-        """Return the settings of the layered HMM: as in the thesis, restarted where told to."""
+    def lhmm_settings(self, any_state: float) -> LayeredHmmSettings:
+        """Return the settings of the layered HMM: as in the thesis, restarted at given marks."""
         return LayeredHmmSettings(
             observing=ObservationSettings(symbols=self.symbols),
             gestemes=GestemeHmmSettings(
@@ -59,11 +59,11 @@ class LayeredSettings(StudySettings):
         )
 
 
-class FollowedSettings(TaskFigureSettings, LayeredSettings):
+class FollowedSettings(TaskFigureSettings, LayeredHmmFigureSettings):
     """Of figures 4.12 and 4.13."""
 
 
-class DrawnFollowedSettings(DrawnOrderSettings, LayeredSettings):
+class DrawnFollowedSettings(DrawnOrderSettings, LayeredHmmFigureSettings):
     """Of figures 4.16 and 4.17."""
 
 
@@ -86,7 +86,7 @@ def unseen_order_followed(settings: DrawnFollowedSettings, rng: np.random.Genera
 
 
 def _drawn(
-    learned: TaskSet, shown: TaskSet, settings: LayeredSettings, *, by_gesteme: bool
+    learned: TaskSet, shown: TaskSet, settings: LayeredHmmFigureSettings, *, by_gesteme: bool
 ) -> Drawn:
     """Learn one task, follow all performances of the other, draw the first and tell of all.
 
@@ -94,12 +94,12 @@ def _drawn(
     more is true.
     """
     task, names = learned.task, names_of(learned)
-    layered, eager = (
-        learn(task, learned.demonstrations, settings.layered(any_state), recognizer="lhmm")
+    lhmm, eager = (
+        learn(task, learned.demonstrations, settings.lhmm_settings(any_state), recognizer="lhmm")
         for any_state in (settings.any_state, settings.eager_any_state)
     )
     filtering = learn(task, learned.demonstrations)
-    followed = [follow(layered, performance) for performance in shown.performances]
+    followed = [follow(lhmm, performance) for performance in shown.performances]
     hurried = [follow(eager, performance) for performance in shown.performances]
     believed = [believe(filtering, performance) for performance in shown.performances]
 
@@ -160,21 +160,21 @@ def _found(
         if wrong.any() and not wrong.all()
         else ""
     )
-    layered, unmarked = scores["lhmm"], scores["segment_filter"]
+    lhmm, unmarked = scores["lhmm"], scores["segment_filter"]
     return (
         f"The winning gesteme HMM was right in {100 * (~wrong).mean():.0f} % of {len(truth)} "
-        f"steps. The layered HMM, restarted at the true changes, had {_percent(layered[0])} of "
-        f"{what} right and saw the changes {_delays(layered[0])} late. The two most probable "
+        f"steps. The layered HMM, restarted at the true changes, had {_percent(lhmm[0])} of "
+        f"{what} right and saw the changes {_delays(lhmm[0])} late. The two most probable "
         f"differed by {margin_of(followed.states):.2f} on average for its states, by "
         f"{followed.margin_of_gestemes:.2f} for the gesteme HMMs. {fall}The segment filter, told "
         f"nothing, had {_percent(unmarked[0])} right and saw the changes {_delays(unmarked[0])} "
-        f"late. Over all {len(layered)} performances: layered HMM {_pooled(layered)}; segment "
+        f"late. Over all {len(lhmm)} performances: layered HMM {_pooled(lhmm)}; segment "
         f"filter {_pooled(unmarked)}."
     )
 
 
 def _differs(
-    settings: LayeredSettings,
+    settings: LayeredHmmFigureSettings,
     followed: Followed,
     truth: Integers,
     scores: Mapping[str, Sequence[Scores]],
@@ -199,7 +199,7 @@ def _differs(
         )
     told.append(
         "Likelihoods are drawn on a logarithmic scale. The bottom panel is not in the thesis: it "
-        "is a recognizer told nothing of changes, which therefore sees some before they come, as "
+        "is a recognizer given no changes, which therefore sees some before they come, as "
         "the hand rounds a corner, and some after."
     )
     return " ".join(told)

@@ -45,7 +45,7 @@ class TaskFigureSettings(TaskSettings):
     """κ of (3.3)."""
 
 
-class _Motion(NamedTuple):
+class _SimulatedPath(NamedTuple):
     reference: Array
     """m, shape (R, D)."""
     trace: Trace
@@ -159,12 +159,14 @@ def five_state_task(settings: TaskFigureSettings, rng: np.random.Generator) -> D
     return Drawn(picture, numbers, found, differs)
 
 
-def _motion(settings: TrajectorySettings, rng: np.random.Generator) -> _Motion:
+def _motion(settings: TrajectorySettings, rng: np.random.Generator) -> _SimulatedPath:
     drawing, moving = rng.spawn(2)
     curves = random_gestemes(settings.references, settings.gestemes, drawing)
     reference, owners = joined(curves, settings.step_m / 2)
     reference = reference[:, : settings.dimensions]
-    return _Motion(reference, moved(reference, settings.operator(settings.noise), moving, owners))
+    return _SimulatedPath(
+        reference, moved(reference, settings.operator(settings.noise), moving, owners)
+    )
 
 
 def _motion_legend() -> list[Line2D]:

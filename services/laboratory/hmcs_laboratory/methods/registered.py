@@ -25,7 +25,7 @@ WHOLE = (
     WholeMethod("hmcs-gestemes", "hmcs_laboratory.single_gestemes.model", fit_single),
     WholeMethod(
         "hmcs-gestemes-share",
-        "the same, told which share of the motion it sees, as DTW, MiniRocket, SVM and LDA are",
+        "the same, given which share of the motion it sees, as DTW, MiniRocket, SVM and LDA are",
         fit_single_of_share,
         whole_only=True,
     ),

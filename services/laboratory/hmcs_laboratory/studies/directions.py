@@ -178,9 +178,9 @@ def _sure_delays(lines: Integers, believed: Array, nearest: Integers, sure: floa
     delays = []
     for begin, end in pairwise(edges):
         own = nearest[lines[begin]]
-        told = np.flatnonzero(believed[begin:end, own] > sure)
+        sure_at = np.flatnonzero(believed[begin:end, own] > sure)
         hidden = begin > 0 and nearest[lines[begin - 1]] == own
-        delays.append(end - begin if hidden or not len(told) else int(told[0]))
+        delays.append(end - begin if hidden or not len(sure_at) else int(sure_at[0]))
     return delays
 
 

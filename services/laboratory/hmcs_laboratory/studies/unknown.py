@@ -1,4 +1,4 @@
-"""A study of unknown intent: is motion that is no part of the task told from motion that is?"""
+"""A study of unknown intent: is motion that is no part of the task recognized as such?"""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from hmcs_laboratory.methods.online_peers import learn_concatenated_hmm
 from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
 
 Data = Literal["five-states", "drawings"]
-Motion = Literal["shapes", "smooth", "reaches"]
+UnknownMotion = Literal["shapes", "smooth", "reaches"]
 Name = Literal["hmcs-segment-filter", "concatenated-hmm"]
 
 WINDOW_STEPS = 20
@@ -51,7 +51,11 @@ class UnknownSettings(TaskSettings):
     human-drawn shapes in a fixed order."""
     noise: tuple[NotNegative, ...] = (0.15, 0.3)
     """κ of (3.3), of the hand that performs the five states."""
-    motions: Annotated[tuple[Motion, ...], Field(min_length=1)] = ("shapes", "smooth", "reaches")
+    motions: Annotated[tuple[UnknownMotion, ...], Field(min_length=1)] = (
+        "shapes",
+        "smooth",
+        "reaches",
+    )
     """Unknown to the drawings: other shapes, smooth random motion, or reaches at random."""
     training: Annotated[int, Field(ge=1, le=5)] = 5
     """Drawings of each shape to learn from; the task is performed with two others."""
@@ -182,12 +186,12 @@ def _measures(method: _Method, of_task: _Watched, of_unknown: _Watched) -> dict[
 def _watched(method: _Method, steps: Sequence[Step], begin: int) -> _Watched:
     """Follow a whole motion; watch the windows that lie within its steps from `begin` on."""
     recognizer = method.fresh()
-    told = [recognizer.step(step) for step in steps]
+    recognitions = [recognizer.step(step) for step in steps]
     full = slice(begin + method.window_steps - 1, None)
     return _Watched(
-        method.fits(told)[full],
-        np.array([each.unknown_alarm for each in told])[full],
-        np.array([each.belief.unknown for each in told])[full],
+        method.fits(recognitions)[full],
+        np.array([each.unknown_alarm for each in recognitions])[full],
+        np.array([each.belief.unknown for each in recognitions])[full],
     )
 
 
@@ -208,8 +212,8 @@ def _segment_filter(data: TaskSet, rng: np.random.Generator) -> _Method:
 def _concatenated(data: TaskSet, rng: np.random.Generator) -> _Method:
     """The mean log-likelihood of a plain HMM over as many steps."""
 
-    def fits(told: Sequence[Recognition]) -> Array:
-        sums = np.cumsum([0.0, *(each.belief.log_likelihood for each in told)])
+    def fits(recognitions: Sequence[Recognition]) -> Array:
+        sums = np.cumsum([0.0, *(each.belief.log_likelihood for each in recognitions)])
         ends = np.arange(1, len(sums))
         begins = np.maximum(ends - WINDOW_STEPS, 0)
         return np.asarray((sums[ends] - sums[begins]) / (ends - begins))
@@ -218,7 +222,9 @@ def _concatenated(data: TaskSet, rng: np.random.Generator) -> _Method:
     return _Method(fresh, WINDOW_STEPS, fits, alarms=False)
 
 
-_MOTIONS: Mapping[Motion, Callable[[UnknownSettings, TaskSet, np.random.Generator], Array]] = {
+_MOTIONS: Mapping[
+    UnknownMotion, Callable[[UnknownSettings, TaskSet, np.random.Generator], Array]
+] = {
     "shapes": lambda settings, data, rng: other_drawings(
         [gesteme.name for gesteme in data.task.gestemes], settings.unknown_shapes, rng
     ),
@@ -232,7 +238,7 @@ _METHODS: Mapping[Name, Callable[[TaskSet, np.random.Generator], _Method]] = {
 
 UNKNOWN = Study(
     "unknown",
-    "motion that is no part of the task told from motion that is",
+    "motion that is no part of the task recognized as such",
     "Aarno 2007, section 4.3",
     UnknownSettings,
     unknown_trial,

@@ -64,7 +64,7 @@ class Filtered(NamedTuple):
     """log P(observation t | observations 0..t−1), shape (T,)."""
 
 
-class Segment(NamedTuple):
+class StateInterval(NamedTuple):
     """A segment of the most probable segmentation."""
 
     state: int
@@ -77,7 +77,7 @@ class Segment(NamedTuple):
 class Segmentation(NamedTuple):
     """The most probable segmentation."""
 
-    segments: tuple[Segment, ...]
+    segments: tuple[StateInterval, ...]
     states: States
     """The state at each step, shape (T,)."""
     log_probability: float
@@ -166,7 +166,7 @@ def decoded(model: DurationHmm, log_emission: Array) -> Segmentation:
             remaining += 1
     bounds = [*reversed(firsts), steps]
     segments = tuple(
-        Segment(int(path[first]), first, after - first) for first, after in pairwise(bounds)
+        StateInterval(int(path[first]), first, after - first) for first, after in pairwise(bounds)
     )
     return Segmentation(segments, path, log_probability)
 

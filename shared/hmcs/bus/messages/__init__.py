@@ -22,7 +22,7 @@ from hmcs.bus.messages.operator import Handle, Motion
 from hmcs.bus.messages.process import Ask, Description, Done, Health, Refusal, SettingsReport
 from hmcs.bus.messages.recognition import Belief, Evidence, LoadModel
 from hmcs.bus.messages.recording import Label, Outline, OutlineQuestion, Record, SetLabels
-from hmcs.bus.messages.robot import RobotLooks, RobotState, StopRequest
+from hmcs.bus.messages.robot import RobotDescription, RobotState, StopRequest
 from hmcs.bus.messages.steps import LastSteps, LastStepsQuestion, Step
 from hmcs.bus.messages.training import Train, TrainingProgress
 
@@ -51,7 +51,7 @@ __all__ = [
     "Pairing",
     "Record",
     "Refusal",
-    "RobotLooks",
+    "RobotDescription",
     "RobotState",
     "SetLabels",
     "SettingsReport",
@@ -84,7 +84,7 @@ MESSAGES: tuple[type[Message], ...] = (
     LastSteps,
     LoadModel,
     ActivateRecognizer,
-    RobotLooks,
+    RobotDescription,
     Record,
     Train,
     OutlineQuestion,

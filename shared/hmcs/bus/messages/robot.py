@@ -79,7 +79,7 @@ class StopRequest(Message):
     """Who wants it and why, in one line."""
 
 
-class RobotLooks(Message):
+class RobotDescription(Message):
     """How a robot looks: what is needed to draw it."""
 
     SCHEMA = "robot_looks"

@@ -13,7 +13,7 @@ from hmcs.arrays import Array
 from hmcs.recognition.discovery.consensus import Consensus, between, consensus
 from hmcs.recognition.discovery.curve_pieces import Stretches, cut, fitted, parameters, stretches_of
 from hmcs.recognition.discovery.stops import stops
-from hmcs.recognition.discovery.unlabeled_motions import Stepped, rising
+from hmcs.recognition.discovery.unlabeled_demos import ResampledDemo, rising
 
 Integers = NDArray[np.int64]
 
@@ -57,7 +57,9 @@ class OrderCut(NamedTuple):
     """Whether the boundaries are stops."""
 
 
-def cut_order(demonstrations: Sequence[Stepped], step_m: float, settings: CutSettings) -> OrderCut:
+def cut_order(
+    demonstrations: Sequence[ResampledDemo], step_m: float, settings: CutSettings
+) -> OrderCut:
     """Cut demonstrations of the same order, the first in their middle.
 
     Where they stop is where they are cut; where they never stop, it is where the best lines and
@@ -84,7 +86,7 @@ def cut_order(demonstrations: Sequence[Stepped], step_m: float, settings: CutSet
 
 
 def _order_cut(
-    demonstrations: Sequence[Stepped],
+    demonstrations: Sequence[ResampledDemo],
     mean: Consensus,
     knots: Integers,
     at: tuple[Array, ...],
@@ -104,7 +106,7 @@ def _between_knots(points: Array, knots: Integers) -> tuple[Array, ...]:
 
 
 def _knots(
-    demonstrations: Sequence[Stepped], mean: Consensus, step_m: float, settings: CutSettings
+    demonstrations: Sequence[ResampledDemo], mean: Consensus, step_m: float, settings: CutSettings
 ) -> tuple[Integers, Array]:
     """Knots of the mean by shape, and the share of demonstrations that show each."""
     stretches = stretches_of(mean.path, settings.shortest_steps)

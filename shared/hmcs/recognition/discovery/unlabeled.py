@@ -24,11 +24,11 @@ from hmcs.recognition.discovery.consensus import alike
 from hmcs.recognition.discovery.order_cuts import CutSettings, OrderCut, cut_order
 from hmcs.recognition.discovery.piece_shapes import grouped, spread_about
 from hmcs.recognition.discovery.task_states import TaskStates, task_states
-from hmcs.recognition.discovery.unlabeled_motions import (
-    Motion,
-    checked_motions,
+from hmcs.recognition.discovery.unlabeled_demos import (
+    UnlabeledDemo,
+    checked_demos,
     common_step_m,
-    stepped,
+    resampled,
 )
 from hmcs.recognition.segments import LearningError
 from hmcs.task import Task
@@ -102,13 +102,13 @@ def discover(
     Raises LearningError when there is none, or one is of another shape, not finite, does not move,
     or is shorter than a piece may be.
     """
-    motions = checked_motions(demonstrations)
-    original = [next(k for k, o in enumerate(motions) if o.same(motion)) for motion in motions]
+    demos = checked_demos(demonstrations)
+    original = [next(k for k, o in enumerate(demos) if o.same(demo)) for demo in demos]
     different = sorted(set(original))
     step_m = common_step_m(
-        [motions[k] for k in different], settings.least_step_m, settings.most_steps
+        [demos[k] for k in different], settings.least_step_m, settings.most_steps
     )
-    steps = {k: stepped(motions[k], step_m, settings.cut.shortest_steps) for k in different}
+    steps = {k: resampled(demos[k], step_m, settings.cut.shortest_steps) for k in different}
     groups = alike([steps[k].points for k in different], step_m, settings.least_cosine)
     orders = [[different[k] for k in group] for group in groups]
     cuts = [cut_order([steps[k] for k in order], step_m, settings.cut) for order in orders]
@@ -117,12 +117,12 @@ def discover(
     place = {k: (o, n) for o, order in enumerate(orders) for n, k in enumerate(order)}
     states = task_states([gestemes[place[k][0]] for k in original])
     segmented = []
-    for motion, k, sequence in zip(motions, original, states.sequences, strict=True):
+    for demo, k, sequence in zip(demos, original, states.sequences, strict=True):
         order, n = place[k]
         boundaries = steps[k].samples(cuts[order].at[n])
-        piece = np.searchsorted(boundaries, np.arange(len(motion.positions)), side="right")
+        piece = np.searchsorted(boundaries, np.arange(len(demo.positions)), side="right")
         segmented.append(
-            Segmented(motion.name, order, boundaries, sequence[piece], gestemes[order][piece])
+            Segmented(demo.name, order, boundaries, sequence[piece], gestemes[order][piece])
         )
     performed: list[list[Array]] = [[] for _ in range(int(states.gestemes.max()) + 1)]
     for own, order_cut in zip(gestemes, cuts, strict=True):
@@ -137,7 +137,7 @@ def discover(
         states,
         tuple(each.support for each in cuts),
         step_m,
-        tuple(_notes(motions, original, orders)),
+        tuple(_notes(demos, original, orders)),
     )
 
 
@@ -204,18 +204,16 @@ def _gestemes(
 
 
 def _notes(
-    motions: Sequence[Motion], original: Sequence[int], orders: Sequence[Sequence[int]]
+    demos: Sequence[UnlabeledDemo], original: Sequence[int], orders: Sequence[Sequence[int]]
 ) -> Iterator[str]:
     for k, first in enumerate(original):
         if first != k:
-            yield (
-                f"{motions[k].name!r} is the same motion as {motions[first].name!r}: it counts once"
-            )
+            yield (f"{demos[k].name!r} is the same motion as {demos[first].name!r}: it counts once")
     if len(orders) > 1:
         yield f"demonstrations have {len(orders)} different orders: each was cut by itself"
     for order in orders:
         if len(order) == 1:
             yield (
-                f"{motions[order[0]].name!r} is the only one of its order: no other demonstration "
+                f"{demos[order[0]].name!r} is the only one of its order: no other demonstration "
                 "supports its boundaries"
             )

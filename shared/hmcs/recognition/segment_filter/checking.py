@@ -23,8 +23,8 @@ from hmcs.recognition.segment_filter.gestemes import (
     Scoring,
 )
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel
-from hmcs.recognition.segment_filter.senses import Senses
-from hmcs.recognition.sensors import Sensors, dimensions
+from hmcs.recognition.segment_filter.sensor_densities import SensorDensities
+from hmcs.recognition.step_features import Sensors, sensor_dimensions
 from hmcs.recognition.unknown import AlarmSettings
 from hmcs.task import Task
 
@@ -32,14 +32,14 @@ LONGEST_ALARM_STEPS = 10_000
 """The alarm remembers so many steps at most."""
 
 
-def check_segment_filter(layers: SegmentFilterModel, task: Task) -> None:
+def check_segment_filter(knowledge: SegmentFilterModel, task: Task) -> None:
     """Raise ValueError where the arrays do not fit together, or not the task, or a number is none
     that the filter can compute with."""
-    _check_parameters(layers.parameters, task)
-    _check_senses(layers.parameters.senses, layers.parameters.initial.shape)
-    _check_scoring(layers.scoring)
-    check_filter_settings(layers.filter_settings)
-    _check_alarm(layers.alarm)
+    _check_parameters(knowledge.parameters, task)
+    _check_sensor_densities(knowledge.parameters.senses, knowledge.parameters.initial.shape)
+    _check_scoring(knowledge.scoring)
+    check_filter_settings(knowledge.filter_settings)
+    _check_alarm(knowledge.alarm)
 
 
 def check_filter_settings(settings: FilterSettings) -> None:
@@ -96,10 +96,10 @@ def _check_parameters(p: GestemeParameters, task: Task) -> None:
         raise ValueError("array 'initial' lets a gesteme begin in a phase that is none")
 
 
-def _check_senses(senses: Senses, phases: tuple[int, ...]) -> None:
+def _check_sensor_densities(senses: SensorDensities, phases: tuple[int, ...]) -> None:
     for name in senses.names:
         check_choice("a sense", name, Sensors._fields)
-    count = sum(dimensions(senses.names, ()))
+    count = sum(sensor_dimensions(senses.names, ()))
     check_shapes(
         senses._asdict(),
         {"means": (*phases, count), "variances": (*phases, count), "weights": (count,)},

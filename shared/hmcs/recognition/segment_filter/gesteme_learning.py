@@ -20,13 +20,13 @@ from hmcs.recognition.hmm.model import Hmm
 from hmcs.recognition.segment_filter.exits import DEFAULT_WEIGHTS
 from hmcs.recognition.segment_filter.filter import FilterSettings
 from hmcs.recognition.segment_filter.gestemes import LONGEST_WINDOW_STEPS, GestemeParameters
-from hmcs.recognition.segment_filter.senses import (
-    Senses,
-    SenseWeights,
-    floors_of,
-    names_of,
-    rows_of,
-    weights_of,
+from hmcs.recognition.segment_filter.sensor_densities import (
+    SensorDensities,
+    SensorWeights,
+    sensor_rows,
+    sensor_weights,
+    sensors_used,
+    variance_floors,
 )
 from hmcs.recognition.segment_filter.variants import VariantSettings, split_into_variants
 from hmcs.recognition.segments import Segment
@@ -52,7 +52,7 @@ class LearningSettings(NamedTuple):
     """Iterations of Baum–Welch on means and variances after the alignment by path length."""
     variants: VariantSettings = VariantSettings()
     """When demonstrations of one gesteme are so far apart that they are different motions."""
-    senses: SenseWeights = SenseWeights()
+    senses: SensorWeights = SensorWeights()
     """Further senses, and how much each counts."""
     temperature: float = 4.0
     """See `Scoring`."""
@@ -70,7 +70,7 @@ class LearningSettings(NamedTuple):
     alarm_window_steps: int = 20
     unknown_rise: float = 0.9
     """The background is raised by so much of the alarm's threshold: then unknown motion is not
-    only told by the alarm but becomes the most probable state of the filter."""
+    only raises the alarm but becomes the most probable state of the filter."""
     filter: FilterSettings = FilterSettings()
     """What the task does not foresee."""
 
@@ -99,13 +99,13 @@ def fit_gestemes(
 
     The exit is the default one: it is learned from segments left out, see `learning`.
     """
-    motions = [[segment.motion(axes) for segment in own] for own in by_gesteme]
+    motions = [[segment.trajectory(axes) for segment in own] for own in by_gesteme]
     split = split_into_variants([[m.positions for m in own] for own in motions], settings.variants)
     groups = [(g, group) for g, own in enumerate(split) for group in own]
     models = [(g, [motions[g][k] for k in group]) for g, group in groups]
-    names = names_of([s for own in by_gesteme for s in own], settings.senses)
-    felt = [[rows_of(by_gesteme[g][k], names) for k in group] for g, group in groups]
-    sense_floor = floors_of([rows for own in felt for rows in own])
+    names = sensors_used([s for own in by_gesteme for s in own], settings.senses)
+    felt = [[sensor_rows(by_gesteme[g][k], names) for k in group] for g, group in groups]
+    sense_floor = variance_floors([rows for own in felt for rows in own])
     step_m = float(np.mean([length for _, own in models for m in own for length in m.lengths]))
     observed = [[m.observations for m in own] for _, own in models]
     lengths = [float(np.mean([len(o) for o in own])) for own in observed]
@@ -148,7 +148,7 @@ def fit_gestemes(
                 _smoothed(sensed.var(axis=0)) + sense_floor,
             )
         )
-    weights = weights_of(names, settings.senses)
+    weights = sensor_weights(names, settings.senses)
     return _packed(fitted, len(by_gesteme), len(axes), step_m, names, weights)
 
 
@@ -195,7 +195,7 @@ def _packed(
         normals=normals,
         exit_weights=DEFAULT_WEIGHTS,
         step_m=step_m,
-        senses=Senses(sense_names, sense_means, sense_variances, sense_weights),
+        senses=SensorDensities(sense_names, sense_means, sense_variances, sense_weights),
     )
 
 

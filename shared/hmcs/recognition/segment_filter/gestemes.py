@@ -23,8 +23,8 @@ from hmcs.recognition.recognizer import StepEvidence
 from hmcs.recognition.segment_filter import alignment
 from hmcs.recognition.segment_filter.alignment import Alignment
 from hmcs.recognition.segment_filter.exits import exit_features, exit_probability
-from hmcs.recognition.segment_filter.senses import Senses, log_densities
-from hmcs.recognition.sensors import SensorReader
+from hmcs.recognition.segment_filter.sensor_densities import SensorDensities, log_densities
+from hmcs.recognition.step_features import StepFeatureReader
 
 Integers = NDArray[np.int32]
 
@@ -65,7 +65,7 @@ class GestemeParameters(NamedTuple):
     """Of the exit's logistic regression, shape (10,); see `exits`."""
     step_m: float
     """Mean length of a step, m."""
-    senses: Senses
+    senses: SensorDensities
     """What the phases expect of further senses, shapes (G, N, S)."""
 
 
@@ -114,7 +114,7 @@ class GestemeBank:
                 parameters.means, parameters.variances, possible, scoring.alignment
             )
         self._similarity = alignment.as_learned(0, len(self._axes))
-        self._reader = SensorReader(parameters.senses.names, self._axes)
+        self._reader = StepFeatureReader(parameters.senses.names, self._axes)
         self._held = np.array(sorted(held), dtype=np.int32)
         phases = parameters.means.shape[1]
         self._gesteme = np.zeros(0, dtype=np.int32)

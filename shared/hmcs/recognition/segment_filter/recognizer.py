@@ -44,9 +44,9 @@ def segment_filter_model(model: Model) -> SegmentFilterModel:
 
 def bank_of(model: Model, held: Sequence[int] | None = None) -> GestemeBank:
     """Return a fresh bank of the gestemes with the indices `held`, or of all."""
-    layers = segment_filter_model(model)
+    knowledge = segment_filter_model(model)
     indices = range(len(model.task.gestemes)) if held is None else held
-    return GestemeBank(layers.parameters, layers.scoring, model.axes, indices)
+    return GestemeBank(knowledge.parameters, knowledge.scoring, model.axes, indices)
 
 
 def filter_of(model: Model, *, anywhere: bool = False) -> SegmentFilter:

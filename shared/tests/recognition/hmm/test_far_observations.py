@@ -23,7 +23,7 @@ from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.hmm.model import Hmm, posterior, validate
 from hmcs.recognition.hmm.topologies import left_right, start_in
 from hmcs_baselines.hmm.batch import baum_welch_many
-from hmcs_baselines.hmm.layered import Layer, LayeredFilter
+from hmcs_baselines.hmm.layer_stack import Layer, LayerStackFilter
 from hmcs_baselines.hmm.semi_markov import decoded, duration_hmm, filtered, smoothed
 
 OFFSETS = [0.0, 1e3, 1e7, 1e9, 1e12]
@@ -153,7 +153,7 @@ def test_the_beliefs_of_layers_sum_to_one_at_any_distance(offset: float) -> None
         Layer(tuple(gaussian(seed) for seed in range(3)), window=5),
         Layer((upper,)),
     ]
-    layered = LayeredFilter(layers)
+    layered = LayerStackFilter(layers)
     for observation in vectors(0) + offset:
         for belief in layered.step(observation):
             assert belief.models.sum() == pytest.approx(1.0)

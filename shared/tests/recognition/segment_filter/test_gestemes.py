@@ -12,7 +12,7 @@ from hmcs.recognition.segment_filter.exits import exit_features, exit_probabilit
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
 from hmcs.recognition.segment_filter.gestemes import GestemeBank
 from hmcs.recognition.segment_filter.recognizer import bank_of, filter_of
-from hmcs.recognition.segment_filter.senses import SenseWeights
+from hmcs.recognition.segment_filter.sensor_densities import SensorWeights
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def test_a_bank_that_gains_gestemes_still_knows_how_the_hand_was_turned(task, pe
         quaternions = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
         return demonstration._replace(orientations=quaternions)
 
-    settings = LearningSettings(senses=SenseWeights(turn=1.0))
+    settings = LearningSettings(senses=SensorWeights(turn=1.0))
     model = learn(task, [turned(seed) for seed in range(3)], settings)
     steps = steps_of_demonstration(turned(50), task.dead_zone_m)
     whole, part, fresh = bank_of(model), bank_of(model, [0, 1]), bank_of(model, [2])

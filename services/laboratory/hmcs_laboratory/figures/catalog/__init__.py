@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown
+from hmcs.task.model import unknown_name_message
 from hmcs_laboratory.figures.catalog.beyond import BEYOND
 from hmcs_laboratory.figures.catalog.chapter2 import CHAPTER_2
 from hmcs_laboratory.figures.catalog.chapter3 import CHAPTER_3
@@ -24,5 +24,5 @@ def find_figures(numbers: Sequence[str]) -> tuple[Figure[Any], ...]:
     known = [figure.number for figure in FIGURES]
     for number in numbers:
         if number not in known:
-            raise UserError(unknown("figure", number, known))
+            raise UserError(unknown_name_message("figure", number, known))
     return tuple(figure for figure in FIGURES if not numbers or figure.number in numbers)

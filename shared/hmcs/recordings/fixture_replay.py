@@ -27,7 +27,7 @@ from hmcs.fixtures.controller.interface import Fixture
 from hmcs.fixtures.controller.rules import Safeguards
 from hmcs.recordings.reading import Recorded, RecordingContent
 from hmcs.recordings.replaying import Replay, recognizer_named, settings_in
-from hmcs.recordings.ticks import Did, Tick, Ticks
+from hmcs.recordings.ticks import FixtureOutput, Tick, Ticks
 from hmcs.translation import guides_of
 
 HEARD = (Motion, Step, Belief, RobotState, FixtureState)
@@ -36,7 +36,7 @@ CONTROLLER = "fixture_controller/"
 _LARGEST_SETTING = 1e9
 
 
-class Guided(NamedTuple):
+class FixtureReplay(NamedTuple):
     """A recording through a fixture controller."""
 
     followed: tuple[str, ...]
@@ -48,9 +48,9 @@ class Guided(NamedTuple):
     """What is to be known besides, a sentence each."""
 
 
-def guided(
+def replay_fixture(
     content: RecordingContent, replay: Replay, progress: Callable[[float], None] = lambda _: None
-) -> Guided:
+) -> FixtureReplay:
     """Return what the fixture does in a recording with the beliefs of a replay of it.
 
     Every sample, step and position of the robot comes when it was recorded; a belief comes when the
@@ -60,8 +60,10 @@ def guided(
     RegionError for a forbidden region that cannot be.
     """
     began_s = time.process_time()
-    settings, active = _controller_told(content)
-    again = _Again(replay, Safeguards() if settings is None else safeguards_told(settings), active)
+    settings, active = _recorded_controller(content)
+    replayed = _ReplayedController(
+        replay, Safeguards() if settings is None else safeguards_from(settings), active
+    )
     followed: dict[str, None] = {}
     answered = False
     begun_ns = content.first_ns
@@ -69,31 +71,33 @@ def guided(
     for recorded, envelope, message in content.of_any(*HEARD):
         origin = envelope.origin
         if isinstance(message, FixtureState) and origin is not None:
-            again.ticks.add_then(origin.boot, origin.seq, _did(message))
+            replayed.ticks.add_then(origin.boot, origin.seq, _recorded_output(message))
             followed |= dict.fromkeys([message.model] if message.model else ())
             answered = True
             continue
-        again.hear((recorded.log_ns - begun_ns) / 1e9, recorded, envelope, message)
+        replayed.hear((recorded.log_ns - begun_ns) / 1e9, recorded, envelope, message)
         progress((recorded.log_ns - begun_ns) / lasts_ns)
-    notes = _notes(again, settings is not None, answered, tuple(followed), replay.compared_with)
-    return Guided(tuple(followed), again.ticks, time.process_time() - began_s, tuple(notes))
+    notes = _notes(replayed, settings is not None, answered, tuple(followed), replay.compared_with)
+    return FixtureReplay(
+        tuple(followed), replayed.ticks, time.process_time() - began_s, tuple(notes)
+    )
 
 
-def safeguards_told(settings: Mapping[str, Any]) -> Safeguards:
+def safeguards_from(settings: Mapping[str, Any]) -> Safeguards:
     """Return the safeguards in a fixture controller's settings, as it reports them.
 
-    What they do not tell, or not as a number, is as by default.
+    What they do not give, or not as a number, is as by default.
     """
-    told: dict[str, float] = {}
+    given: dict[str, float] = {}
     for name in Safeguards.__dataclass_fields__:
         milliseconds = settings.get(f"{name.removesuffix('_s')}_ms") if name[-2:] == "_s" else None
         value = settings.get(name) if milliseconds is None else milliseconds
         if isinstance(value, int | float) and 0 <= value <= _LARGEST_SETTING:
-            told[name] = value if milliseconds is None else value / 1e3
-    return Safeguards(**told)
+            given[name] = value if milliseconds is None else value / 1e3
+    return Safeguards(**given)
 
 
-class _Again:
+class _ReplayedController:
     """A controller that hears what the recorded one heard, as its service lets it.
 
     Nobody waits for samples that stay out: the first one after a gap finds it long enough to stop.
@@ -141,7 +145,7 @@ class _Again:
         if made is None:
             self.refused += 1
             return
-        self.ticks.add(recorded.log_ns, source.boot, number, _would_do(made))
+        self.ticks.add(recorded.log_ns, source.boot, number, _replayed_output(made))
 
     def _stepped(self, now_s: float, envelope: Envelope, step: Step) -> None:
         """Take a step, and the belief after it where none was recorded that says when it came."""
@@ -164,9 +168,13 @@ class _Again:
 
 
 def _notes(
-    again: _Again, settings_known: bool, recorded: bool, followed: tuple[str, ...], other: str
+    replayed: _ReplayedController,
+    settings_known: bool,
+    recorded: bool,
+    followed: tuple[str, ...],
+    other: str,
 ) -> Iterator[str]:
-    if not again.ticks:
+    if not replayed.ticks:
         yield "no sample of the operator's device was recorded: the fixture does nothing"
     if not recorded:
         yield "no fixture was recorded: there is nothing to compare with"
@@ -177,18 +185,18 @@ def _notes(
         )
     if not settings_known:
         yield "the settings of the recorded fixture are not kept with it: defaults are used"
-    if not again.robots:
+    if not replayed.robots:
         yield (
             "no robot was recorded: nobody knows how far it was beside its guides, so that nothing "
             "leads it back to them"
         )
-    if again.lost:
-        yield f"{again.lost} samples of the operator's device are missing"
-    if again.refused:
-        yield f"{again.refused} samples came again or from a second input device: left out"
+    if replayed.lost:
+        yield f"{replayed.lost} samples of the operator's device are missing"
+    if replayed.refused:
+        yield f"{replayed.refused} samples came again or from a second input device: left out"
 
 
-def _controller_told(content: RecordingContent) -> tuple[Mapping[str, Any] | None, bool]:
+def _recorded_controller(content: RecordingContent) -> tuple[Mapping[str, Any] | None, bool]:
     """The settings of the recorded fixture controller, and whether it followed a model already."""
     for name, facts in content.metadata.items():
         settings = settings_in(facts) if name.startswith(CONTROLLER) else None
@@ -197,8 +205,8 @@ def _controller_told(content: RecordingContent) -> tuple[Mapping[str, Any] | Non
     return None, False
 
 
-def _would_do(fixture: Fixture) -> Did:
-    return Did(
+def _replayed_output(fixture: Fixture) -> FixtureOutput:
+    return FixtureOutput(
         fixture.state,
         fixture.reason,
         fixture.factor,
@@ -210,14 +218,14 @@ def _would_do(fixture: Fixture) -> Did:
     )
 
 
-def _did(told: FixtureState) -> Did:
-    return Did(
-        told.state,
-        told.reason,
-        told.factor,
-        told.compliance,
-        told.preferred_direction,
-        told.command_twist[:3],
-        told.off_guide_m,
-        told.engaged,
+def _recorded_output(state: FixtureState) -> FixtureOutput:
+    return FixtureOutput(
+        state.state,
+        state.reason,
+        state.factor,
+        state.compliance,
+        state.preferred_direction,
+        state.command_twist[:3],
+        state.off_guide_m,
+        state.engaged,
     )

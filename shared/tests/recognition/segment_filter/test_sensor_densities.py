@@ -8,7 +8,12 @@ from hmcs.motion.steps import steps_of_demonstration
 from hmcs.recognition.learning import learn
 from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
-from hmcs.recognition.segment_filter.senses import Senses, SenseWeights, floors_of, log_densities
+from hmcs.recognition.segment_filter.sensor_densities import (
+    SensorDensities,
+    SensorWeights,
+    log_densities,
+    variance_floors,
+)
 from hmcs.recognition.segments import LearningError
 
 FORCE_N = {"go": 3.0, "turn": -3.0, "rise": 0.0}
@@ -26,7 +31,7 @@ def felt(demonstration: Demonstration, seed: int, force=FORCE_N) -> Demonstratio
 @pytest.fixture(scope="module")
 def taught(task, performances):
     demonstrations = [felt(performances(["along", "round", "up"], s), s) for s in range(4)]
-    weights = SenseWeights(turn=0.5, force=1.0)
+    weights = SensorWeights(turn=0.5, force=1.0)
     return learn(task, demonstrations, LearningSettings(senses=weights))
 
 
@@ -53,7 +58,9 @@ def test_a_silent_sense_speaks_for_nothing(taught, performances):
 
 
 def test_each_sense_counts_by_its_weight():
-    senses = Senses(("force",), np.zeros((1, 1, 3)), np.ones((1, 1, 3)), np.array([2.0, 0.0, 1.0]))
+    senses = SensorDensities(
+        ("force",), np.zeros((1, 1, 3)), np.ones((1, 1, 3)), np.array([2.0, 0.0, 1.0])
+    )
     values = np.array([1.0, 5.0, -2.0])
     single = -0.5 * (values**2 + np.log(2 * np.pi))
     assert log_densities(senses, values)[0, 0] == pytest.approx(2.0 * single[0] + single[2])
@@ -63,13 +70,13 @@ def test_a_demonstration_without_a_sense_that_counts_is_told(task, performances)
     demonstrations = [felt(performances(["along", "round", "up"], 0), 0)]
     demonstrations.append(performances(["along", "round", "up"], 1))
     with pytest.raises(LearningError, match=r"'seed-1' has no force: record it, or set its weight"):
-        learn(task, demonstrations, LearningSettings(senses=SenseWeights(force=1.0)))
+        learn(task, demonstrations, LearningSettings(senses=SensorWeights(force=1.0)))
 
 
 def test_silence_counts_as_the_sense_does_on_average():
     rng = np.random.default_rng(0)
     means, variances = rng.normal(size=(2, 3, 3)), rng.uniform(0.2, 3.0, (2, 3, 3))
-    senses = Senses(("force",), means, variances, np.array([1.0, 0.5, 2.0]))
+    senses = SensorDensities(("force",), means, variances, np.array([1.0, 0.5, 2.0]))
     drawn = means + np.sqrt(variances) * rng.normal(size=(20_000, 2, 3, 3))
     # What each phase expects of itself, on average over what it lets one feel.
     squares = ((drawn - means) ** 2 / variances).mean(axis=0)
@@ -82,4 +89,4 @@ def test_no_phase_is_surer_of_a_sense_than_a_quarter_of_its_spread():
     spread = np.array([0.1, 4.0, 0.0])
     rows = [rng.normal(0, spread, (400, 3)) for _ in range(20)]
     # What never varies is as sure as the finest device.
-    np.testing.assert_allclose(np.sqrt(floors_of(rows)), [0.025, 1.0, 1e-3], rtol=0.05)
+    np.testing.assert_allclose(np.sqrt(variance_floors(rows)), [0.025, 1.0, 1e-3], rtol=0.05)

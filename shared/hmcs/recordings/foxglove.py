@@ -67,7 +67,7 @@ _MOTION, _ROBOT_STATE = schema_of(Motion), schema_of(RobotState)
 _UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
 
-class Shown(NamedTuple):
+class FoxgloveMessage(NamedTuple):
     """One message in a schema of Foxglove's."""
 
     topic: str
@@ -75,7 +75,7 @@ class Shown(NamedTuple):
     fields: dict[str, Any]
 
 
-class Showing:
+class FoxgloveConverter:
     """Makes them of the messages of one recording, in their order."""
 
     def __init__(self) -> None:
@@ -92,7 +92,7 @@ class Showing:
         self._joints[robot] = joints
         self.undescribed.discard(robot)
 
-    def of(self, fields: dict[str, Any], log_ns: int) -> Iterator[Shown]:
+    def of(self, fields: dict[str, Any], log_ns: int) -> Iterator[FoxgloveMessage]:
         """Yield what is to be shown of a message, by its fields as `fields_of` gives them."""
         schema = fields["schema"]
         if schema not in (_MOTION, _ROBOT_STATE):
@@ -103,19 +103,23 @@ class Showing:
         if schema == _MOTION:
             turned = fields.get("orientation") or _UPRIGHT
             pose = _pose(fields["position"], turned)
-            yield Shown(f"{PREFIX}hand", "foxglove.PoseInFrame", _in_frame(log_ns, OPERATOR, pose))
+            yield FoxgloveMessage(
+                f"{PREFIX}hand", "foxglove.PoseInFrame", _in_frame(log_ns, OPERATOR, pose)
+            )
             return
         pose = _pose(fields["tool_position"], fields["tool_orientation"])
-        yield Shown(f"{PREFIX}tool", "foxglove.PoseInFrame", _in_frame(log_ns, BASE, pose))
+        yield FoxgloveMessage(
+            f"{PREFIX}tool", "foxglove.PoseInFrame", _in_frame(log_ns, BASE, pose)
+        )
         states = self._joint_states(fields, log_ns)
-        yield Shown(f"{PREFIX}joints", "foxglove.JointStates", states)
+        yield FoxgloveMessage(f"{PREFIX}joints", "foxglove.JointStates", states)
         if log_ns - self._grown_ns >= TRAIL_EVERY_NS:
             self._grown_ns = log_ns
             self._trail.append(pose)
         if log_ns - self._told_ns >= TRAIL_TOLD_NS:
             self._told_ns = log_ns
             trail = {"timestamp": _time(log_ns), "frame_id": BASE, "poses": list(self._trail)}
-            yield Shown(f"{PREFIX}trail", "foxglove.PosesInFrame", trail)
+            yield FoxgloveMessage(f"{PREFIX}trail", "foxglove.PosesInFrame", trail)
 
     def _joint_states(self, fields: dict[str, Any], log_ns: int) -> dict[str, Any]:
         """Its joints, where the state or somebody else names them."""

@@ -33,7 +33,7 @@ class Sensors(NamedTuple):
     """Of the operator, N·m."""
 
 
-class SensorReader:
+class StepFeatureReader:
     """Reads sensors step by step; a sensor that has nothing to say gives NaN."""
 
     def __init__(self, names: Sequence[str], axes: Sequence[int]) -> None:
@@ -64,13 +64,13 @@ class SensorReader:
         return step.wrench[:3] if name == "force" else step.wrench[3:]
 
 
-def sensor_rows(steps: Iterable[Step], names: Sequence[str], axes: Sequence[int]) -> Array:
+def step_features(steps: Iterable[Step], names: Sequence[str], axes: Sequence[int]) -> Array:
     """Return the sensor values of a whole motion, shape (T, F)."""
-    reader = SensorReader(names, axes)
+    reader = StepFeatureReader(names, axes)
     return np.array([reader.step(step) for step in steps])
 
 
-def sensors_of(motions: Iterable[Sequence[Step]], sensors: Sensors) -> tuple[str, ...]:
+def available_sensors(motions: Iterable[Sequence[Step]], sensors: Sensors) -> tuple[str, ...]:
     """Return the names of those sensors that all motions have."""
     steps = [step for motion in motions for step in motion]
     absent = set()
@@ -81,7 +81,7 @@ def sensors_of(motions: Iterable[Sequence[Step]], sensors: Sensors) -> tuple[str
     return tuple(name for name, used in sensors._asdict().items() if used and name not in absent)
 
 
-def dimensions(names: Sequence[str], axes: Sequence[int]) -> tuple[int, ...]:
+def sensor_dimensions(names: Sequence[str], axes: Sequence[int]) -> tuple[int, ...]:
     """Return how many dimensions each sensor has."""
     own = {"direction": len(axes), "length": 1}
     return tuple(own.get(name, 3) for name in names)

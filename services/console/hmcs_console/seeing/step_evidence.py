@@ -12,26 +12,26 @@ STEPS = 8
 """So many steps are kept: a belief comes a little after its evidence, and after that of others."""
 
 
-class Gathered(NamedTuple):
+class StepEvidence(NamedTuple):
     """What was made of the newest steps of one recognizer."""
 
-    told: Mapping[tuple[str, int], tuple[Evidence, ...]] = MappingProxyType({})
+    by_step: Mapping[tuple[str, int], tuple[Evidence, ...]] = MappingProxyType({})
     """By clock and step, in order of their coming."""
 
 
-def gathered(before: Gathered, evidence: Evidence) -> Gathered:
+def with_evidence(before: StepEvidence, evidence: Evidence) -> StepEvidence:
     """Return what is known once more evidence has come."""
     step = evidence.clock, evidence.step
-    if step in before.told:
-        return Gathered({**before.told, step: (*before.told[step], evidence)})
-    newest = list(before.told.items())[-STEPS + 1 :]
-    return Gathered({**dict(newest), step: (evidence,)})
+    if step in before.by_step:
+        return StepEvidence({**before.by_step, step: (*before.by_step[step], evidence)})
+    newest = list(before.by_step.items())[-STEPS + 1 :]
+    return StepEvidence({**dict(newest), step: (evidence,)})
 
 
-def beneath(belief: Belief, known: Gathered) -> tuple[Evidence, ...]:
+def evidence_of(belief: Belief, known: StepEvidence) -> tuple[Evidence, ...]:
     """Return the evidence a belief stands on; of another model than the belief's there is none."""
-    told = known.told.get((belief.clock, belief.step), ())
-    return tuple(each for each in told if each.model_hash == belief.model_hash)
+    found = known.by_step.get((belief.clock, belief.step), ())
+    return tuple(each for each in found if each.model_hash == belief.model_hash)
 
 
 def usable(evidence: Evidence) -> bool:

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hmcs_baselines.clustering import ClusteringError
-from hmcs_baselines.elbow import (
+from hmcs_baselines.cluster_count import (
     CusumSettings,
     cusum_elbow,
     error_elbow,
@@ -12,6 +11,7 @@ from hmcs_baselines.elbow import (
     search_clusters,
     slope_elbow,
 )
+from hmcs_baselines.clustering import ClusteringError
 
 
 def directions(count, seed, each=40, noise=0.08):

@@ -90,7 +90,7 @@ class LayerBelief(NamedTuple):
         return self.models if len(self.models) > 1 else self.states[0]
 
 
-class LayeredFilter:
+class LayerStackFilter:
     """Moves the belief of every layer from observation to observation."""
 
     def __init__(self, layers: Sequence[Layer]) -> None:
@@ -149,9 +149,10 @@ def run(
 ) -> list[tuple[LayerBelief, ...]]:
     """Return the beliefs of all layers after each observation.
 
-    `restarts[l]` are the observations before which layer l is restarted. Raises as `LayeredFilter`.
+    `restarts[l]` are the observations before which layer l is restarted. Raises as
+    `LayerStackFilter`.
     """
-    layered = LayeredFilter(layers)
+    layered = LayerStackFilter(layers)
     beliefs = []
     for t, observation in enumerate(observations):
         for layer, times in (restarts or {}).items():

@@ -9,8 +9,8 @@ import pytest
 
 from hmcs.bus.messages import Envelope, Motion, RobotState, Source
 from hmcs.bus.wire import encode
-from hmcs.recordings.plain import fields_of
-from hmcs.recordings.well_known import MOST_UNDESCRIBED, Showing, Shown
+from hmcs.recordings.foxglove import MOST_UNDESCRIBED, FoxgloveConverter, FoxgloveMessage
+from hmcs.recordings.json_codec import fields_of
 
 ROBOT = Source(service="robot", instance="r", boot="b")
 
@@ -35,7 +35,7 @@ def state(robot: str = "arm", names: tuple[str, ...] = ()) -> dict[str, Any]:
     return fields_of(encode(body, Envelope(source=ROBOT, seq=0)))
 
 
-def joints(shown: list[Shown]) -> list[dict[str, Any]]:
+def joints(shown: list[FoxgloveMessage]) -> list[dict[str, Any]]:
     (states,) = [each for each in shown if each.schema == "foxglove.JointStates"]
     found = states.fields["joints"]
     assert isinstance(found, list)
@@ -43,7 +43,7 @@ def joints(shown: list[Shown]) -> list[dict[str, Any]]:
 
 
 def test_joints_have_the_names_that_the_state_has() -> None:
-    shown = joints(list(Showing().of(state(names=("waist", "elbow")), 1)))
+    shown = joints(list(FoxgloveConverter().of(state(names=("waist", "elbow")), 1)))
     assert shown == [
         {"name": "waist", "position": 0.1, "velocity": 0.0},
         {"name": "elbow", "position": 0.2, "velocity": 1.0},
@@ -51,7 +51,7 @@ def test_joints_have_the_names_that_the_state_has() -> None:
 
 
 def test_joints_have_the_names_of_the_description_where_the_state_has_none() -> None:
-    showing = Showing()
+    showing = FoxgloveConverter()
     assert joints(list(showing.of(state(), 1))) == []
     assert showing.undescribed == {"arm"}
     showing.name_joints("arm", ("waist", "elbow"))
@@ -62,7 +62,7 @@ def test_joints_have_the_names_of_the_description_where_the_state_has_none() -> 
 
 @pytest.mark.parametrize("names", [("waist",), ("a", "b", "c"), ()])
 def test_names_that_do_not_fit_are_not_shown_and_none_are_invented(names: tuple[str, ...]) -> None:
-    showing = Showing()
+    showing = FoxgloveConverter()
     showing.name_joints("arm", names)
     assert joints(list(showing.of(state(), 1))) == []
 
@@ -70,11 +70,11 @@ def test_names_that_do_not_fit_are_not_shown_and_none_are_invented(names: tuple[
 def test_a_state_of_the_version_before_is_shown_too() -> None:
     fields = state()
     del fields["joint_names"]
-    assert joints(list(Showing().of(fields, 1))) == []
+    assert joints(list(FoxgloveConverter().of(fields, 1))) == []
 
 
 def test_so_many_robots_are_noted_and_no_more() -> None:
-    showing = Showing()
+    showing = FoxgloveConverter()
     for number in range(100):
         list(showing.of(state(f"robot-{number}"), number * 10**9))
     assert len(showing.undescribed) == MOST_UNDESCRIBED
@@ -85,5 +85,5 @@ def test_a_hand_without_orientation_is_shown_upright() -> None:
     fields = fields_of(encode(motion, Envelope(source=ROBOT, seq=0)))
     for left_out in ((), ("orientation", "wrench", "origin", "clutch")):
         told = {name: value for name, value in fields.items() if name not in left_out}
-        (shown,) = Showing().of(told, 1)
+        (shown,) = FoxgloveConverter().of(told, 1)
         assert shown.fields["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}

@@ -12,12 +12,12 @@ COMMENT = "#"
 _MARK = f"{COMMENT} found by hmcs train --find-states; whoever changes a line makes it his own: "
 
 
-def marked(text: str) -> str:
+def with_generated_marker(text: str) -> str:
     """Return the text of a file, whole lines, with a last line that says that it was found."""
     return f"{text}{_MARK}{_sum(text)}\n"
 
 
-def is_as_found(file: Path) -> bool:
+def is_unchanged_generated(file: Path) -> bool:
     """Return whether a file was found and is unchanged since; False where there is none.
 
     Raises UserError where it cannot be read.

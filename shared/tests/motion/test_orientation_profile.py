@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hmcs.motion.orientation_profile import OrientationProfile, mean_orientation_profile
 from hmcs.motion.quaternions import between
-from hmcs.motion.turns import Turns, mean_turns
 
 
 def turning(begun: Rotation, rate_rad_per_m: float, count: int = 50):
@@ -24,7 +24,9 @@ def begun() -> list[Rotation]:
 
 def test_the_mean_turn_does_not_depend_on_how_the_hand_was_held_at_first(begun):
     shown = [turning(each, 2.0, count) for each, count in zip(begun, (20, 35, 50, 80), strict=True)]
-    turns = Turns(mean_turns([p for p, _ in shown], [q for _, q in shown]))
+    turns = OrientationProfile(
+        mean_orientation_profile([p for p, _ in shown], [q for _, q in shown])
+    )
     for progress in (0.0, 0.25, 0.5, 1.0):
         wanted = Rotation.from_rotvec([0, 0, 2.0 * 0.3 * progress]).as_quat()
         assert np.linalg.norm(between(turns.at(progress), wanted)) < 1e-3
@@ -34,19 +36,23 @@ def test_the_sign_of_a_quaternion_says_nothing(begun):
     points, turned = turning(begun[0], 3.0)
     flipped = turned * np.where(np.arange(len(turned)) % 3, 1.0, -1.0)[:, None]
     np.testing.assert_allclose(
-        mean_turns([points], [turned]), mean_turns([points], [flipped]), atol=1e-12
+        mean_orientation_profile([points], [turned]),
+        mean_orientation_profile([points], [flipped]),
+        atol=1e-12,
     )
 
 
 def test_the_mean_of_two_turns_is_half_way(begun):
     shown = [turning(begun[0], 1.0), turning(begun[1], 2.0)]
-    turns = Turns(mean_turns([p for p, _ in shown], [q for _, q in shown]))
+    turns = OrientationProfile(
+        mean_orientation_profile([p for p, _ in shown], [q for _, q in shown])
+    )
     half = Rotation.from_rotvec([0, 0, 1.5 * 0.3]).as_quat()
     assert np.linalg.norm(between(turns.at(1.0), half)) < 1e-6
 
 
 def test_a_hand_that_does_not_move_has_no_turns_along_its_way():
     with pytest.raises(ValueError, match="does not move"):
-        mean_turns([np.zeros((5, 3))], [np.tile([0.0, 0, 0, 1], (5, 1))])
+        mean_orientation_profile([np.zeros((5, 3))], [np.tile([0.0, 0, 0, 1], (5, 1))])
     with pytest.raises(ValueError, match="no performance"):
-        mean_turns([], [])
+        mean_orientation_profile([], [])

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from hmcs.errors import UserError
-from hmcs.recordings.parts import NoRoomError
+from hmcs.recordings.file_rotation import NoRoomError
 from hmcs.recordings.reading import read
 from support.recordings import BEGUN_NS, KEYS, PERIOD_NS, ROOMY, Maker, Said
 

@@ -16,7 +16,12 @@ import numpy as np
 from hmcs.arrays import Array
 from hmcs.recognition.hmm.densities import log_gaussian
 from hmcs.recognition.segments import LearningError, Segment
-from hmcs.recognition.sensors import Sensors, dimensions, sensor_rows, sensors_of
+from hmcs.recognition.step_features import (
+    Sensors,
+    available_sensors,
+    sensor_dimensions,
+    step_features,
+)
 
 _FLOOR_SHARE = 0.25
 """No phase is surer of a sense than this share of the sense's spread over all gestemes."""
@@ -24,7 +29,7 @@ _LEAST_SPREAD = 1e-3
 """rad, N or N·m: finer than any device."""
 
 
-class SenseWeights(NamedTuple):
+class SensorWeights(NamedTuple):
     """How much each further sense counts; a sense of weight 0 is not looked at."""
 
     turn: float = 0.0
@@ -35,7 +40,7 @@ class SenseWeights(NamedTuple):
     """Of the operator."""
 
 
-class Senses(NamedTuple):
+class SensorDensities(NamedTuple):
     """What phases expect of the further senses."""
 
     names: tuple[str, ...]
@@ -47,7 +52,7 @@ class Senses(NamedTuple):
     """Shape (S,)."""
 
 
-def names_of(segments: Sequence[Segment], weights: SenseWeights) -> tuple[str, ...]:
+def sensors_used(segments: Sequence[Segment], weights: SensorWeights) -> tuple[str, ...]:
     """Return the senses looked at.
 
     Raises LearningError where a demonstration lacks one of them.
@@ -55,7 +60,7 @@ def names_of(segments: Sequence[Segment], weights: SenseWeights) -> tuple[str, .
     wanted = Sensors(False, False, weights.turn > 0, weights.force > 0, weights.torque > 0)
     names = tuple(name for name, used in wanted._asdict().items() if used)
     for segment in segments:
-        lacking = set(names) - set(sensors_of([segment.steps], wanted))
+        lacking = set(names) - set(available_sensors([segment.steps], wanted))
         if lacking:
             raise LearningError(
                 f"demonstration {segment.demonstration!r} has no {', '.join(sorted(lacking))}: "
@@ -64,32 +69,32 @@ def names_of(segments: Sequence[Segment], weights: SenseWeights) -> tuple[str, .
     return names
 
 
-def rows_of(segment: Segment, names: Sequence[str]) -> Array:
+def sensor_rows(segment: Segment, names: Sequence[str]) -> Array:
     """Return what the senses say of each step of a segment, shape (T, S).
 
     The turn of the first step is that of the second: nothing is known before it.
     """
     if not names:
         return np.zeros((len(segment.steps), 0))
-    rows = sensor_rows(segment.steps, names, ())
+    rows = step_features(segment.steps, names, ())
     unknown = np.isnan(rows[0])
     rows[0, unknown] = rows[1, unknown]
     return rows
 
 
-def weights_of(names: Sequence[str], weights: SenseWeights) -> Array:
+def sensor_weights(names: Sequence[str], weights: SensorWeights) -> Array:
     """Return the weight of each dimension, shape (S,)."""
     own = [getattr(weights, name) for name in names]
-    return np.repeat(np.array(own, dtype=np.float64), dimensions(names, ()))
+    return np.repeat(np.array(own, dtype=np.float64), sensor_dimensions(names, ()))
 
 
-def floors_of(rows: Sequence[Array]) -> Array:
+def variance_floors(rows: Sequence[Array]) -> Array:
     """Return the least variance of each dimension, shape (S,), from all segments' rows."""
     spread = np.concatenate(list(rows)).std(axis=0)
     return np.asarray(np.maximum(_FLOOR_SHARE * spread, _LEAST_SPREAD) ** 2)
 
 
-def log_densities(senses: Senses, values: Array) -> Array:
+def log_densities(senses: SensorDensities, values: Array) -> Array:
     """Return what one step's senses say of each phase, weighted, nats, shape (G, N).
 
     `values` (S,) is NaN where a sense is silent: it then counts as it does on average, so that

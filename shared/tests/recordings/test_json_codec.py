@@ -16,7 +16,7 @@ from hmcs.bus.arrays import to_wire
 from hmcs.bus.examples import ENVELOPE, EXAMPLES
 from hmcs.bus.messages import Message, Motion
 from hmcs.bus.wire import decode, encode, schema_of
-from hmcs.recordings.plain import NoMessageError, fields_of, json_schema_of, message_of
+from hmcs.recordings.json_codec import NoMessageError, fields_of, json_schema_of, message_of
 
 PUBLISHED = [body for body in EXAMPLES if type(body).__name__ != "RobotLooks"]
 

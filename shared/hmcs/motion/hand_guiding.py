@@ -15,7 +15,7 @@ FASTEST_M_S = 5.0
 """No hand wants to go faster along any axis: what asks for more is no hand's."""
 
 
-class Led(NamedTuple):
+class AdmittanceResponse(NamedTuple):
     """What comes of a push."""
 
     wrench: Array
@@ -24,7 +24,7 @@ class Led(NamedTuple):
     """The velocity it asks for, m/s and rad/s, shape (6,)."""
 
 
-class LeadingHand:
+class HandGuiding:
     """Pushes as hard as the arm needs to go as the hand wants; the sensor has the last word.
 
     A velocity that is none, or is not finite, is no push, and the sensor begins anew after it.
@@ -36,26 +36,26 @@ class LeadingHand:
         self._bandwidth_hz = bandwidth_hz
         self._sensor = ForceSensor(bandwidth_hz)
 
-    def push(self, velocity: Array, orientation: Array, elapsed_s: float) -> Led:
+    def push(self, velocity: Array, orientation: Array, elapsed_s: float) -> AdmittanceResponse:
         """Push for `elapsed_s` to go at `velocity`, m/s, shape (3,).
 
         The tool is turned by the quaternion `orientation`, x y z w, base frame.
         """
         if not (np.abs(velocity).max() <= FASTEST_M_S and elapsed_s >= 0.0):
             self._sensor = ForceSensor(self._bandwidth_hz)
-            return Led(np.zeros(6), np.zeros(6))
+            return AdmittanceResponse(np.zeros(6), np.zeros(6))
         wanted = self._admittance.wrench(np.concatenate([velocity, np.zeros(3)]))
         reading = self._sensor.read(sensed(wanted, self._payload, orientation), elapsed_s)
         wrench = operator_wrench(reading, self._payload, orientation)
-        return Led(wrench, self._admittance.twist(wrench))
+        return AdmittanceResponse(wrench, self._admittance.twist(wrench))
 
 
-def leading_hand(task: Task) -> LeadingHand | None:
+def hand_guiding_of(task: Task) -> HandGuiding | None:
     """Return the hand that leads the robot of a task by its tool; None where it is teleoperated."""
     if task.robot.mode == "teleoperated":
         return None
     set_up = task.robot.cooperation
-    return LeadingHand(
+    return HandGuiding(
         Admittance(
             set_up.force_threshold_n,
             set_up.torque_threshold_n_m,

@@ -25,12 +25,12 @@ from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segments import LearningError
-from hmcs.recognition.sensors import (
-    SensorReader,
+from hmcs.recognition.step_features import (
     Sensors,
-    dimensions,
-    sensor_rows,
-    sensors_of,
+    StepFeatureReader,
+    available_sensors,
+    sensor_dimensions,
+    step_features,
 )
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
@@ -61,7 +61,7 @@ class LeastSpread(NamedTuple):
     """N·m."""
 
 
-class TaskHmmSettings(NamedTuple):
+class GaussianTaskHmmSettings(NamedTuple):
     """How the task HMM is learned."""
 
     sensors: Sensors = Sensors()
@@ -86,13 +86,13 @@ class GaussianTaskHmm(NamedTuple):
     """Shape (K, F)."""
 
 
-class TaskHmmRecognizer:
+class GaussianTaskHmmRecognizer:
     """The filtered probabilities of the task's states."""
 
     def __init__(self, model: Model, *, anywhere: bool = False) -> None:
         """Begin as the task does or, with `anywhere`, in any state."""
         self._hmm: GaussianTaskHmm = model.knowledge
-        self._reader = SensorReader(self._hmm.sensors, model.axes)
+        self._reader = StepFeatureReader(self._hmm.sensors, model.axes)
         self._filter = SlotFilter(chain_of(model.task), self._hmm.chain, anywhere=anywhere)
 
     def step(self, step: Step) -> Recognition:
@@ -106,7 +106,7 @@ def segment(model: Model, steps: Sequence[Step]) -> Integers:
     hmm: GaussianTaskHmm = model.knowledge
     if not steps:
         return np.zeros(0, dtype=np.int64)
-    rows = sensor_rows(steps, hmm.sensors, model.axes)
+    rows = step_features(steps, hmm.sensors, model.axes)
     return most_probable_states(chain_of(model.task), hmm.chain, slot_log_emission(hmm, rows))
 
 
@@ -125,17 +125,18 @@ def slot_log_emission(hmm: GaussianTaskHmm, rows: Array) -> Array:
 
 
 def _learn(data: TrainingData) -> GaussianTaskHmm:
-    settings: TaskHmmSettings = data.settings
+    settings: GaussianTaskHmmSettings = data.settings
     chain, axes = chain_of(data.task), axes_of(data.task)
-    names = sensors_of([each.steps for each in data.segments], settings.sensors)
+    names = available_sensors([each.steps for each in data.segments], settings.sensors)
     if not names:
         raise LearningError(
             "the demonstrations have none of the sensors asked for: switch one of "
             f"{', '.join(Sensors._fields)} on"
         )
-    rows = [sensor_rows(each.steps, names, axes) for each in data.segments]
+    rows = [step_features(each.steps, names, axes) for each in data.segments]
     floor = np.repeat(
-        [getattr(settings.least_spread, name) ** 2 for name in names], dimensions(names, axes)
+        [getattr(settings.least_spread, name) ** 2 for name in names],
+        sensor_dimensions(names, axes),
     )
     by_slot = slot_rows(chain, data.segments, rows)
     data.progress(f"{len(by_slot)} states with {len(floor)} dimensions: {', '.join(names)}")
@@ -148,7 +149,7 @@ def _learn(data: TrainingData) -> GaussianTaskHmm:
 
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
-    return TaskHmmRecognizer(model, anywhere=anywhere)
+    return GaussianTaskHmmRecognizer(model, anywhere=anywhere)
 
 
 def _check(hmm: GaussianTaskHmm, task: Task) -> None:
@@ -157,7 +158,7 @@ def _check(hmm: GaussianTaskHmm, task: Task) -> None:
     check_within("number of sensors", len(hmm.sensors), 1, len(Sensors._fields))
     slots = len(chain_of(task).slot_state)
     check_slot_chain(hmm.chain, slots)
-    shape = (slots, sum(dimensions(hmm.sensors, axes_of(task))))
+    shape = (slots, sum(sensor_dimensions(hmm.sensors, axes_of(task))))
     check_shapes(hmm._asdict(), {"means": shape, "variances": shape})
     check_within("means", hmm.means, -LARGEST, LARGEST)
     check_spreads("variances", hmm.variances)
@@ -167,7 +168,7 @@ KIND = RecognizerSpec(
     name="task-hmm",
     summary="one HMM state per task state, independent Gaussian sensors, dwell-time transitions",
     source="Hannaford & Lee 1990; thesis 2.3 and (2.33)",
-    settings=TaskHmmSettings,
+    settings=GaussianTaskHmmSettings,
     knowledge=GaussianTaskHmm,
     learn=_learn,
     recognizer=_recognizer,

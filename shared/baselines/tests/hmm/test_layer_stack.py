@@ -12,7 +12,7 @@ from hmcs.recognition.hmm.inference import ImpossibleSequenceError, forward, log
 from hmcs.recognition.hmm.learning import CHAIN, baum_welch
 from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.hmm.model import Hmm, evaluate
-from hmcs_baselines.hmm.layered import Layer, LayeredFilter, LayerError, run
+from hmcs_baselines.hmm.layer_stack import Layer, LayerError, LayerStackFilter, run
 from hmcs_baselines.hmm.markov import MarkovModelError
 from hmcs_baselines.hmm.soft_evidence import SoftSymbols, learn_task
 
@@ -200,7 +200,7 @@ def test_a_restarted_layer_is_as_new_and_the_others_go_on():
 
 def test_reset_forgets_everything():
     rng = np.random.default_rng(8)
-    layered = LayeredFilter(
+    layered = LayerStackFilter(
         [Layer((gaussian(rng, 2), gaussian(rng, 2))), Layer((discrete(rng, 2, 2),))]
     )
     observations = rng.normal(size=(4, 2))
@@ -211,7 +211,7 @@ def test_reset_forgets_everything():
 
 
 def test_an_impossible_window_is_named_and_leaves_the_filter_as_it_was():
-    layered = LayeredFilter([Layer((only(0, 3), only(1, 3)))])
+    layered = LayerStackFilter([Layer((only(0, 3), only(1, 3)))])
     layered.step(0)
     with pytest.raises(ImpossibleSequenceError, match=r"layer 0.*observation 1 since") as raised:
         layered.step(1)
@@ -224,13 +224,13 @@ def test_an_impossible_window_is_named_and_leaves_the_filter_as_it_was():
 
 
 def test_a_model_that_makes_the_window_impossible_has_no_share_in_it():
-    first, second = LayeredFilter([Layer((only(0, 3), only(1, 3)))]).step(1)[0].states
+    first, second = LayerStackFilter([Layer((only(0, 3), only(1, 3)))]).step(1)[0].states
     assert (first[0], second[0]) == (0.0, 1.0)
 
 
 def test_observations_that_are_not_numbers_are_refused():
     rng = np.random.default_rng(9)
-    layered = LayeredFilter([Layer((gaussian(rng, 2),))])
+    layered = LayerStackFilter([Layer((gaussian(rng, 2),))])
     with pytest.raises(ObservationError):
         layered.step(np.array([0.0, np.nan]))
 
@@ -239,14 +239,14 @@ def test_layers_that_do_not_fit_together_are_refused():
     rng = np.random.default_rng(10)
     below = Layer((gaussian(rng, 2), gaussian(rng, 2)))
     with pytest.raises(LayerError, match="model 0 of layer 1 observes 3 symbols"):
-        LayeredFilter([below, Layer((discrete(rng, 2, 3),))])
+        LayerStackFilter([below, Layer((discrete(rng, 2, 3),))])
     with pytest.raises(LayerError, match="Gaussian emission"):
-        LayeredFilter([below, Layer((gaussian(rng, 2),))])
+        LayerStackFilter([below, Layer((gaussian(rng, 2),))])
     with pytest.raises(LayerError, match="no layers"):
-        LayeredFilter([])
+        LayerStackFilter([])
     for number in (-1, 1):
         with pytest.raises(LayerError, match=f"no layer {number}"):
-            LayeredFilter([below]).restart(number)
+            LayerStackFilter([below]).restart(number)
 
 
 @pytest.mark.parametrize(

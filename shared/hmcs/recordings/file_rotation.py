@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hmcs.errors import UserError
-from hmcs.recordings.plain import Fields
-from hmcs.recordings.well_known import Showing
+from hmcs.recordings.foxglove import FoxgloveConverter
+from hmcs.recordings.json_codec import Fields
 from hmcs.recordings.writing import RecordingFile
 
 SUFFIX = ".mcap"
@@ -62,7 +62,7 @@ class Recording:
         self._folder, self._name, self._limits = folder, name, limits
         self._preface, self._library = preface, library
         self._number = 0
-        self._showing = Showing()
+        self._showing = FoxgloveConverter()
         self.messages = 0
         """Written so far; what is shown to viewers besides does not count."""
         folder.mkdir(parents=True, exist_ok=True)

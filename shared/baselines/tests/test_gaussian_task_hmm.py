@@ -13,22 +13,22 @@ from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.registry import recognizer_of
 from hmcs.recognition.segments import LearningError, Segment, labeled_steps
-from hmcs.recognition.sensors import SensorReader, Sensors, sensor_rows
+from hmcs.recognition.step_features import Sensors, StepFeatureReader, step_features
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
-from hmcs_baselines.slots import learn_slot_chain
-from hmcs_baselines.task_hmm_gaussian import (
-    TaskHmmSettings,
+from hmcs_baselines.gaussian_task_hmm import (
+    GaussianTaskHmmSettings,
     segment,
     slot_log_emission,
 )
+from hmcs_baselines.slots import learn_slot_chain
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
-STRICT = TaskHmmSettings(any_state=0.0)
+STRICT = GaussianTaskHmmSettings(any_state=0.0)
 
 
 @cache
-def taught(settings: TaskHmmSettings = STRICT) -> Model:
+def taught(settings: GaussianTaskHmmSettings = STRICT) -> Model:
     demonstrations = [performed(seed) for seed in range(4)]
     return learn(lesson_task(), demonstrations, settings, recognizer="task-hmm")
 
@@ -49,7 +49,7 @@ def lasting(state: int, gesteme: int, steps: int) -> Segment:
 def test_the_filter_is_the_forward_algorithm() -> None:
     model, steps = taught(), steps_performed(50)
     hmm = model.knowledge
-    seen = slot_log_emission(hmm, sensor_rows(steps, hmm.sensors, model.axes))
+    seen = slot_log_emission(hmm, step_features(steps, hmm.sensors, model.axes))
     alpha = inference.forward(hmm.chain.initial, hmm.chain.transition, seen)
     filtered = np.exp(alpha - np.logaddexp.reduce(alpha, axis=1)[:, None])
     recognizer, total = recognizer_of(model), 0.0
@@ -92,7 +92,7 @@ def test_means_and_variances_are_those_of_the_labeled_sensors() -> None:
     hmm = model.knowledge
     begin, end = (demonstration.states.index(s) for s in ("turn", "lift"))
     steps = segment_steps(model, begin, end)
-    rows = sensor_rows(steps, ("direction", "turn", "force", "torque"), (0, 1, 2))
+    rows = step_features(steps, ("direction", "turn", "force", "torque"), (0, 1, 2))
     np.testing.assert_allclose(hmm.means[1], np.nanmean(rows, axis=0))
     spread = STRICT.least_spread
     floor = np.repeat([spread.direction, spread.turn, spread.force, spread.torque], 3) ** 2
@@ -124,7 +124,7 @@ def test_viterbi_finds_the_segments_of_a_performance() -> None:
 
 def test_a_sensor_that_falls_silent_is_left_out() -> None:
     hmm = taught().knowledge
-    rows = sensor_rows(steps_performed(8), hmm.sensors, (0, 1, 2))
+    rows = step_features(steps_performed(8), hmm.sensors, (0, 1, 2))
     silent = rows.copy()
     silent[:, 6:] = np.nan
     without = hmm._replace(means=hmm.means[:, :6], variances=hmm.variances[:, :6])
@@ -137,7 +137,7 @@ def test_demonstrations_of_motion_alone_are_enough() -> None:
     bare = [performed(s)._replace(orientations=None, wrenches=None) for s in range(2)]
     model = learn(lesson_task(), bare, recognizer="task-hmm")
     assert model.knowledge.sensors == ("direction",)
-    off = TaskHmmSettings(sensors=Sensors(direction=False))
+    off = GaussianTaskHmmSettings(sensors=Sensors(direction=False))
     with pytest.raises(LearningError, match="switch one of direction, length"):
         learn(lesson_task(), bare, off, recognizer="task-hmm")
 
@@ -181,7 +181,7 @@ def test_a_turn_is_the_rotation_between_two_orientations(angle_rad: float) -> No
 
 
 def test_the_first_step_has_no_turn_and_one_without_motion_on_the_axes_no_direction() -> None:
-    reader = SensorReader(("direction", "turn", "length"), (0, 1))
+    reader = StepFeatureReader(("direction", "turn", "length"), (0, 1))
     up = Step(0, np.zeros(3), np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.0, 1.0]))
     row = reader.step(up)
     np.testing.assert_array_equal(row, [0, 0, np.nan, np.nan, np.nan, 0.1])

@@ -14,7 +14,7 @@ from hmcs.motion.quaternions import continuous, inverse, product, unit_quaternio
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class OrientationProfile:
     """Rotations from the orientation a path was begun in, at even shares of its length."""
 
     quaternions: Array
@@ -29,7 +29,7 @@ class Turns:
         return np.asarray(between / np.linalg.norm(between))
 
 
-def mean_turns(
+def mean_orientation_profile(
     paths: Sequence[ArrayLike], orientations: Sequence[ArrayLike], count: int = 100
 ) -> Array:
     """Return the mean rotation since the beginning, x y z w, at `count` even shares of length.

@@ -10,17 +10,17 @@ import pytest
 
 from hmcs.errors import UserError
 from hmcs_robot.arm import Arm
-from hmcs_robot.looks import looks_of, missing_meshes
+from hmcs_robot.arm_description import arm_description, missing_meshes
 from hmcs_robot.robots import ROBOTS
 
 
 def test_every_mesh_of_an_arm_is_told_and_every_joint_named(robot: str, arm: Arm) -> None:
-    looks = looks_of(ROBOTS[robot].urdf, arm.joint_names)
-    named = set(re.findall(r'filename="([^"]+)"', looks.urdf))
-    assert named <= set(looks.files)
-    assert len(looks.joints) == len(arm.joints) == len(np.array(ROBOTS[robot].home))
-    for joint in looks.joints:
-        assert f'name="{joint}"' in looks.urdf
+    robot_description = arm_description(ROBOTS[robot].urdf, arm.joint_names)
+    named = set(re.findall(r'filename="([^"]+)"', robot_description.urdf))
+    assert named <= set(robot_description.files)
+    assert len(robot_description.joints) == len(arm.joints) == len(np.array(ROBOTS[robot].home))
+    for joint in robot_description.joints:
+        assert f'name="{joint}"' in robot_description.urdf
 
 
 @pytest.fixture
@@ -57,14 +57,14 @@ def test_a_mesh_is_found_by_every_name_that_descriptions_give(
 ) -> None:
     name = name.replace("FOLDER", str(package))
     file = described(package, f"filename = {quote}{name}{quote}")
-    assert looks_of(file, ()).files == {name: b"mesh"}
+    assert arm_description(file, ()).files == {name: b"mesh"}
     assert missing_meshes(file) == ()
 
 
 @pytest.mark.parametrize("name", ["../meshes/none.stl", "package://other/meshes/a link.stl"])
 def test_a_name_that_leads_to_no_file_is_told(package: Path, name: str) -> None:
     file = described(package, f'filename="{name}"')
-    assert looks_of(file, ()).files == {}
+    assert arm_description(file, ()).files == {}
     assert missing_meshes(file) == (name,)
 
 
@@ -72,7 +72,7 @@ def test_a_description_that_is_no_xml_is_a_mistake_of_its_user(package: Path) ->
     file = package / "urdf" / "arm.urdf"
     file.write_text("robot")
     with pytest.raises(UserError, match="is no URDF"):
-        looks_of(file, ())
+        arm_description(file, ())
 
 
 def test_every_shipped_arm_can_be_drawn_whole(robot: str) -> None:

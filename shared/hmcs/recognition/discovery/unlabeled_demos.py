@@ -17,7 +17,7 @@ from hmcs.recognition.segments import LearningError
 Integers = NDArray[np.int64]
 
 
-class Motion(NamedTuple):
+class UnlabeledDemo(NamedTuple):
     """What is looked at of a demonstration."""
 
     name: str
@@ -26,12 +26,12 @@ class Motion(NamedTuple):
     time_s: Array | None
     """Shape (S,), rising; None where it is not known."""
 
-    def same(self, other: Motion) -> bool:
+    def same(self, other: UnlabeledDemo) -> bool:
         """Return whether the other was made by the very same hand at the same places."""
         return np.array_equal(self.positions, other.positions)
 
 
-class Stepped(NamedTuple):
+class ResampledDemo(NamedTuple):
     """A motion in equal steps."""
 
     points: Array
@@ -51,7 +51,7 @@ class Stepped(NamedTuple):
         return rising(np.interp(at, here, self.at_sample), round(self.at_sample[-1]))
 
 
-def checked_motions(demonstrations: Sequence[Demonstration | ArrayLike]) -> list[Motion]:
+def checked_demos(demonstrations: Sequence[Demonstration | ArrayLike]) -> list[UnlabeledDemo]:
     """Return what may be looked at of each demonstration.
 
     Raises LearningError when there is none, or one has not positions of shape (T, 3), or fewer than
@@ -59,15 +59,15 @@ def checked_motions(demonstrations: Sequence[Demonstration | ArrayLike]) -> list
     """
     if not len(demonstrations):
         raise LearningError("no demonstrations to find gestemes in: give at least one")
-    motions = []
+    demos = []
     for number, given in enumerate(demonstrations, start=1):
         if isinstance(given, Demonstration):
-            motion = Motion(given.name, np.asarray(given.positions, float), given.time_s)
+            demo = UnlabeledDemo(given.name, np.asarray(given.positions, float), given.time_s)
         else:
-            motion = Motion(f"demonstration {number}", np.asarray(given, dtype=float), None)
-        _check(motion)
-        motions.append(motion)
-    return motions
+            demo = UnlabeledDemo(f"demonstration {number}", np.asarray(given, dtype=float), None)
+        _check(demo)
+        demos.append(demo)
+    return demos
 
 
 def rising(at: Array, last: int) -> Integers:
@@ -86,49 +86,49 @@ def rising(at: Array, last: int) -> Integers:
     return np.asarray(np.clip(near, 1, last - count) + index)
 
 
-def common_step_m(motions: Sequence[Motion], least_m: float, most_steps: int) -> float:
+def common_step_m(demos: Sequence[UnlabeledDemo], least_m: float, most_steps: int) -> float:
     """Return the length of step that suits all, m: the median distance between samples.
 
     It is `least_m` where that is longer, and longer still where the longest motion would have more
     than `most_steps`.
     """
-    moves = [np.linalg.norm(np.diff(motion.positions, axis=0), axis=1) for motion in motions]
+    moves = [np.linalg.norm(np.diff(demo.positions, axis=0), axis=1) for demo in demos]
     moved = np.concatenate(moves)
     longest_m = max(float(own.sum()) for own in moves)
     return max(least_m, float(np.median(moved[moved > 0])), longest_m / most_steps)
 
 
-def stepped(motion: Motion, step_m: float, shortest_steps: int) -> Stepped:
+def resampled(demo: UnlabeledDemo, step_m: float, shortest_steps: int) -> ResampledDemo:
     """Return a motion in equal steps; raises LearningError when it has too few of them."""
-    points, index = equal_steps(motion.positions, step_m)
+    points, index = equal_steps(demo.positions, step_m)
     steps = len(points) - 1
     if steps < shortest_steps:
         raise LearningError(
-            f"{motion.name!r} makes {steps} step(s) of {step_m:.4g} m, but a piece has "
+            f"{demo.name!r} makes {steps} step(s) of {step_m:.4g} m, but a piece has "
             f"{shortest_steps} at least: demonstrate it larger, or leave it out"
         )
-    dwell = None if motion.time_s is None else dwells(motion.time_s, index)
-    return Stepped(points, index, dwell)
+    dwell = None if demo.time_s is None else dwells(demo.time_s, index)
+    return ResampledDemo(points, index, dwell)
 
 
-def _check(motion: Motion) -> None:
-    positions = motion.positions
+def _check(demo: UnlabeledDemo) -> None:
+    positions = demo.positions
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise LearningError(
-            f"{motion.name!r} has positions of shape {positions.shape}, expected (T, 3): give x, y "
+            f"{demo.name!r} has positions of shape {positions.shape}, expected (T, 3): give x, y "
             "and z in m, z = 0 for motion in a plane"
         )
     if len(positions) < 2:
         raise LearningError(
-            f"{motion.name!r} has {len(positions)} sample(s), expected two at least: leave it out"
+            f"{demo.name!r} has {len(positions)} sample(s), expected two at least: leave it out"
         )
     if not np.isfinite(positions).all():
         first = int((~np.isfinite(positions).all(axis=1)).argmax())
         raise LearningError(
-            f"{motion.name!r}: position {first} is {positions[first].tolist()}, expected finite "
+            f"{demo.name!r}: position {first} is {positions[first].tolist()}, expected finite "
             "numbers: mend the recording or cut that part out"
         )
     if not np.ptp(positions, axis=0).any():
         raise LearningError(
-            f"{motion.name!r} never moves: all its positions are the same; leave it out"
+            f"{demo.name!r} never moves: all its positions are the same; leave it out"
         )

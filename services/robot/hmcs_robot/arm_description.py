@@ -14,7 +14,7 @@ _IN_PACKAGE = ("package", "model")
 """Schemes of names that begin with the name of a folder, which may be anywhere above."""
 
 
-class Looks(NamedTuple):
+class ArmDescription(NamedTuple):
     """What is needed to draw an arm."""
 
     urdf: str
@@ -24,7 +24,7 @@ class Looks(NamedTuple):
     """Meshes, and the materials and textures beside them, by the name the URDF gives them."""
 
 
-def looks_of(urdf: Path, joints: tuple[str, ...]) -> Looks:
+def arm_description(urdf: Path, joints: tuple[str, ...]) -> ArmDescription:
     """Return the looks of the arm described in a file.
 
     Names that lead to no file are left out, see `missing_meshes`. Raises UserError for a file that
@@ -39,7 +39,7 @@ def looks_of(urdf: Path, joints: tuple[str, ...]) -> Looks:
         material = mesh.with_suffix(".mtl")
         if material.is_file():
             files[str(Path(name).with_suffix(".mtl"))] = material.read_bytes()
-    return Looks(urdf.read_text(encoding="utf-8"), joints, files)
+    return ArmDescription(urdf.read_text(encoding="utf-8"), joints, files)
 
 
 def missing_meshes(urdf: Path) -> tuple[str, ...]:
