@@ -25,6 +25,9 @@ from hmcs.recognition.task_chain import TaskChain
 
 Integers = NDArray[np.int32]
 
+_LEAST_UNKNOWN = float(np.finfo(np.float64).tiny)
+"""Mass of unknown motion that evidence against it leaves."""
+
 
 class FilterSettings(NamedTuple):
     """The probabilities of what the task does not foresee."""
@@ -85,9 +88,11 @@ class SegmentFilter:
         mass = np.concatenate([stayed, new_slots])
 
         log_ratio = table.log_ratio(slot, start)
-        top = max(0.0, float(log_ratio.max(initial=-np.inf)))
-        mass = mass * np.exp(log_ratio - top)
-        unknown *= float(np.exp(-top))
+        # Nothing impossible sets the scale, and the unknown never vanishes: evidence of thousands of
+        # nats would leave no mass to divide by.
+        top = max(0.0, float(log_ratio.max(initial=-np.inf, where=mass > 0.0)))
+        mass = mass * np.exp(np.minimum(log_ratio - top, 0.0))
+        unknown = max(unknown * float(np.exp(-top)), _LEAST_UNKNOWN)
         total = float(mass.sum()) + unknown
         log_likelihood = top + float(np.log(total))
 

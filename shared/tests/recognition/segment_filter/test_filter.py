@@ -287,3 +287,29 @@ def test_evidence_however_strong_leaves_numbers():
     assert belief.states[0] == pytest.approx(1.0)
     begun = chain.initial[0] * (1 - SETTINGS.unknown_after)
     assert belief.log_likelihood == pytest.approx(2_000.0 + np.log(begun), abs=1e-9)
+
+
+EXTREME = st.sampled_from([-np.inf, -1e9, -4_000.0, -1.0, 0.0, 1.0, 4_000.0, 1e9])
+
+
+@given(
+    ratios=st.lists(st.tuples(EXTREME, EXTREME), min_size=1, max_size=6),
+    exits=st.sampled_from([0.0, 0.5, 1.0]),
+    abandon=st.sampled_from([0.0, 1e-4]),
+)
+def test_evidence_of_any_size_leaves_a_belief_that_sums_to_one(ratios, exits, abandon):
+    # Only the first state may begin, so the evidence of the second is of what is impossible.
+    chain = TaskChain(
+        np.array([1.0, 0.0]), np.eye(2), *2 * (np.array([0, 1], dtype=np.int32),), np.ones(2)
+    )
+    task_filter = SegmentFilter(chain, SETTINGS._replace(abandon=abandon))
+    for step, (first, second) in enumerate(ratios):
+        given_pairs = {
+            (g, start): (exits if start < step else 0.0, ratio)
+            for g, ratio in enumerate((first, second))
+            for start in range(step + 1)
+            if np.isfinite(ratio)
+        }
+        belief = task_filter.step(pairs(step, given_pairs))
+        assert belief.states.sum() + belief.unknown == pytest.approx(1.0)
+        assert np.isfinite(belief.log_likelihood)
