@@ -74,7 +74,7 @@ def test_the_first_evidence_for_a_gesteme_wins():
     assert released is not None
     by_gesteme = dict(zip(released.pair_gesteme, released.log_ratio, strict=True))
     assert by_gesteme == {0: 1.0, 1: 1.0, 2: 3.0}
-    assert len(released.evidence.exit) == len(released.evidence.pair_start) == 3
+    assert len(released.exit) == len(released.pair_start) == 3
 
 
 def test_gestemes_are_in_order_whichever_classifier_was_first():
@@ -84,7 +84,7 @@ def test_gestemes_are_in_order_whichever_classifier_was_first():
     g.add(evidence(0, {0, 1}), 0)
     released = g.release(now_ns=0)
     assert released is not None
-    assert released.evidence.gestemes == (0, 1, 2)
+    assert released.gestemes == (0, 1, 2)
 
 
 def test_evidence_that_overtakes_its_step_waits_for_it():
@@ -188,7 +188,7 @@ def test_a_restart_forgets_what_came_for_steps_of_the_same_numbers():
     assert g.add(evidence(40, {0, 1, 2}, ratio=2.0), 5) == "taken"
     released = g.release(now_ns=5)
     assert released is not None
-    np.testing.assert_array_equal(released.evidence.log_ratio, [2.0] * 3)
+    np.testing.assert_array_equal(released.log_ratio, [2.0] * 3)
 
 
 @given(st.data())

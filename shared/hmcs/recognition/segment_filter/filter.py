@@ -88,8 +88,8 @@ class SegmentFilter:
         mass = np.concatenate([stayed, new_slots])
 
         log_ratio = table.log_ratio(slot, start)
-        # Nothing impossible sets the scale, and the unknown never vanishes: evidence of thousands of
-        # nats would leave no mass to divide by.
+        # Nothing impossible sets the scale, and the unknown never vanishes: evidence of thousands
+        # of nats would leave no mass to divide by.
         top = max(0.0, float(log_ratio.max(initial=-np.inf, where=mass > 0.0)))
         mass = mass * np.exp(np.minimum(log_ratio - top, 0.0))
         unknown = max(unknown * float(np.exp(-top)), _LEAST_UNKNOWN)
