@@ -12,7 +12,7 @@ from hmcs.bus.zenoh_callbacks import on_thread
 
 
 class Links:
-    """The links of one Zenoh session; changes are handled by whoever empties the mailbox."""
+    """The links of one Zenoh session; the thread that empties the mailbox handles changes."""
 
     def __init__(
         self,

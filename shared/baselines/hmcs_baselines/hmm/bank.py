@@ -20,8 +20,8 @@ LOST = 1e-300
 class ForwardBank:
     """P(state | observations so far) and log P(observations so far) of M models.
 
-    Scaled probabilities, not the logarithms of `inference`: online, of many models at once, that
-    takes a fraction of the time.
+    It moves scaled probabilities of all models by one observation, without a loop over models;
+    `inference` filters a whole sequence of one model in logarithms.
 
     A step costs O(MN²), or O(MN) where transitions lie on few diagonals, as those of left-right
     models do.

@@ -89,7 +89,7 @@ class GestemeBank:
     """Scores the gestemes it holds, step by step.
 
     It has a forward recursion of its own: no product with a matrix, whose sums depend on how many
-    pairs there are, may stand where a pair is the same to the bit whoever else is there.
+    pairs there are, may stand where a pair is the same to the bit whichever others are there.
     """
 
     def __init__(
