@@ -129,7 +129,7 @@ def test_whoever_hears_it_is_told_to_stand_seen_or_not(make_cell: MakeCell) -> N
     assert heard[0].reason == "Stop on the page of console x"
     cell.until(lambda: "is asked to stand" not in cell.service.answer, "what came of it")
     assert cell.service.answer.count("**may still move**") == 2 * MOST_ASKED
-    assert cell.service.answer.count("not asked") == MOST_ASKED
+    assert cell.service.answer.count("not awaited") == MOST_ASKED
 
 
 def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:

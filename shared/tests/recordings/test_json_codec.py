@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from hmcs.bus.arrays import to_wire
 from hmcs.bus.examples import ENVELOPE, EXAMPLES
-from hmcs.bus.messages import Message, Motion
+from hmcs.bus.messages import Message, Motion, RobotDescription
 from hmcs.bus.wire import decode, encode, schema_of
 from hmcs.recordings.json_codec import NoMessageError, fields_of, json_schema_of, message_of
 
-PUBLISHED = [body for body in EXAMPLES if type(body).__name__ != "RobotLooks"]
+PUBLISHED = [body for body in EXAMPLES if not isinstance(body, RobotDescription)]
 
 
 @pytest.mark.parametrize("body", PUBLISHED, ids=lambda body: schema_of(type(body)))

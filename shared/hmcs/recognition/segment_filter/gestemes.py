@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from hmcs.arrays import Array
 from hmcs.motion.steps import Step
-from hmcs.recognition.hmm.densities import log_at_mean, log_gaussian
 from hmcs.recognition.recognizer import StepEvidence
 from hmcs.recognition.segment_filter import alignment
 from hmcs.recognition.segment_filter.alignment import Alignment
@@ -105,9 +104,12 @@ class GestemeBank:
         self._axes = list(axes)
         # A dimension each, (F, G, N): see `_log_emissions`.
         self._means = np.ascontiguousarray(np.moveaxis(parameters.means, 2, 0))
-        self._half_precisions = np.ascontiguousarray(np.moveaxis(0.5 / parameters.variances, 2, 0))
+        self._precisions = np.ascontiguousarray(np.moveaxis(1.0 / parameters.variances, 2, 0))
         possible = _possible(parameters)
-        self._at_mean = log_at_mean(parameters.variances) + np.where(possible, 0.0, -np.inf)
+        log_possible = np.where(possible, 0.0, -np.inf)
+        self._log_scale = (
+            -0.5 * np.log(2.0 * np.pi * parameters.variances).sum(axis=2) + log_possible
+        )
         self._aligned: alignment.Phases | None = None
         if scoring.alignment.sigma > 0:
             self._aligned = alignment.phases_of(
@@ -229,18 +231,23 @@ class GestemeBank:
         """Return the log density of what each pair observed in each phase, shape (p, N).
 
         `where` is each pair's displacement from its origin, (p, D); `direction`, (D,), is the same
-        for all, so its share is worked out once a gesteme.
+        for all, so its share is worked out once a gesteme. Not by `log_gaussian`: summed in this
+        order, recordings of earlier versions are replayed to the last bit. Dimension by dimension:
+        one sum over a short last axis takes four times as long.
         """
         axes = len(self._axes)
-        shared = log_gaussian(
-            self._at_mean, self._means[axes:], self._half_precisions[axes:], direction
-        )
-        return log_gaussian(
-            shared.take(gesteme, axis=0),
-            (mean.take(gesteme, axis=0) for mean in self._means[:axes]),
-            (half.take(gesteme, axis=0) for half in self._half_precisions[:axes]),
-            where.T[:, :, None],
-        )
+        shared = self._log_scale.copy()
+        for f, component in enumerate(direction, start=axes):
+            shared -= 0.5 * (component - self._means[f]) ** 2 * self._precisions[f]
+        distance = np.zeros((len(gesteme), shared.shape[1]))
+        for f, column in enumerate(where.T):
+            term = column[:, None] - self._means[f].take(gesteme, axis=0)
+            term *= term
+            term *= self._precisions[f].take(gesteme, axis=0)
+            distance += term
+        distance *= -0.5
+        distance += shared.take(gesteme, axis=0)
+        return distance
 
     def _predict(self, index: int) -> tuple[Integers, Integers, Array]:
         """Move every pair's phases one step on, given no exit, and start a pair per gesteme."""
