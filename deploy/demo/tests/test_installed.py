@@ -27,9 +27,9 @@ def distributions() -> set[str]:
 
 
 def run(*command: str | Path, cwd: Path, **environment: str) -> str:
-    """Run a program without what this environment would lend it; fail with what it printed."""
-    lent = ("HMCS_", "PYTHONPATH", "VIRTUAL_ENV", "UV_PROJECT_ENVIRONMENT")
-    own = {name: value for name, value in os.environ.items() if not name.startswith(lent)}
+    """Run a program without the settings of this environment; fail with its output."""
+    settings = ("HMCS_", "PYTHONPATH", "VIRTUAL_ENV", "UV_PROJECT_ENVIRONMENT")
+    own = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
     done = subprocess.run(
         [str(word) for word in command],
         cwd=cwd,
