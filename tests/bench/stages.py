@@ -116,7 +116,7 @@ def task(to: int, path: Path, inputs: int) -> None:
                 evidence = read_evidence(decode(frame.payload, Evidence)[1], model)
                 gathering.add(evidence, time.monotonic_ns())
             while (released := gathering.release(time.monotonic_ns())) is not None:
-                made = recognizer.step(released.evidence)
+                made = recognizer.step(released)
                 belief = Belief(
                     model_hash=model.hash,
                     clock="clock",

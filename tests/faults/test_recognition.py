@@ -120,8 +120,13 @@ def test_the_fixture_fades_to_free_motion_when_beliefs_stay_out(
     stack.until(lambda: watcher.fixture[-1].body.factor == FREE_FACTOR)
     # A belief owes its answer from the first step it leaves out.
     owed_ns = next(o.captured_ns for _, o in scene.hand.kept[made:] if o.captured_ns > fault_ns)
-    took_s = (watcher.fixture[-1].received_ns - owed_ns) * 1e-9
-    assert took_s < FREE_WITHIN_S
+    # By the hand's clock: a machine that stalls makes no samples meanwhile.
+    stiff_ns = [
+        state.envelope.origin.captured_ns
+        for state in list(watcher.fixture)
+        if state.body.factor > FREE_FACTOR and state.envelope.origin is not None
+    ]
+    assert (max(stiff_ns) - owed_ns) * 1e-9 < FREE_WITHIN_S
 
     free = watcher.fixture[-1].body
     assert (free.reason, free.state, free.engaged) == ("belief_stale", "", True)
