@@ -1,4 +1,4 @@
-"""Other units, holes, ways out of the workspace and gestemes that are too long are told."""
+"""Other units, holes, ways out of the workspace and gestemes that are too long are reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Turns of the hand that disagree are told."""
+"""Turns of the hand that disagree are reported."""
 
 from __future__ import annotations
 
