@@ -36,7 +36,6 @@ class ControllerFeed:
         self.robot = FollowingRobot()
         self.clock = ""
         """Boot of the device whose steps count."""
-        self._newest = -1
         self._begin_orders()
 
     def load(self, name: str, guides: Guides) -> None:
@@ -71,7 +70,7 @@ class ControllerFeed:
             self._begin(now_s, source.boot)
         if self._steps.note("step", self.clock, step.index) is None:
             return "old"
-        self._newest = max(self._newest, step.index)
+        self._newest = step.index
         number = None if origin is None else origin.seq
         self.controller.on_step(now_s, step.index, step.position, step.displacement, number)
         for name in [n for n, belief in self._early.items() if belief.step <= self._newest]:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmcs.bus.messages import Belief, Motion, Origin, RobotState, Source, Step
-from hmcs.controller_feed import EARLY_WITHIN, ControllerFeed
+from hmcs.controller_feed import EARLY_KEPT, EARLY_WITHIN, ControllerFeed
 from hmcs.driving import TAKEOVER_S
 from hmcs.fixtures.controller.controller import Controller
 from hmcs.fixtures.controller.interface import Fixture, Guides
@@ -125,6 +125,56 @@ def test_the_steps_of_a_new_device_begin_anew() -> None:
     assert scene.believe(0, clock="b") == "taken"
 
 
+def test_beliefs_of_a_new_device_wait_for_its_own_steps() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    for index in range(8):
+        scene.make_step("a", index)
+    assert scene.believe(8) == "early"
+    scene.samples(60, b=False)
+    assert scene.believe(0, clock="b") == "early"
+    scene.make_step("b", 0)
+    assert scene.believe(3, clock="b") == "early"
+
+
+def test_a_belief_that_overtook_a_step_of_the_device_before_is_forgotten() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.make_step("a", 7)
+    assert scene.believe(8) == "early"
+    scene.samples(60, b=False)
+    scene.make_step("b", 8)
+    assert "m" not in scene.feed.controller._recognizers.beliefs
+
+
+def test_a_step_that_comes_again_is_old() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    assert [scene.make_step("a", index) for index in (0, 1, 1)] == ["taken", "taken", "old"]
+
+
+def test_a_step_names_the_sample_that_completed_it() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    taken: list[tuple[Any, ...]] = []
+    scene.feed.controller.on_step = lambda *step: taken.append(step)  # type: ignore[method-assign]
+    scene.make_step("a", 0)
+    assert taken[0][-1] == scene.seq
+
+
+def test_of_recognizers_that_overtake_their_step_the_last_ones_are_kept() -> None:
+    scene = Scene()
+    scene.samples(10, a=False)
+    scene.guide(5)
+    names = [f"r{k}" for k in range(EARLY_KEPT + 3)]
+    for name in names:
+        scene.feed.load(name, Guides({"g": PATH}, Rules()))
+        assert scene.believe(scene.step, name=name) == "early"
+    scene.make_step("a", scene.step)
+    believed = scene.feed.controller._recognizers.beliefs.keys() - {"m"}
+    assert believed == set(names[3:])
+
+
 def test_a_belief_that_overtook_its_step_counts_once_the_step_is_there() -> None:
     scene = Scene()
     scene.samples(10, a=False)
@@ -218,6 +268,16 @@ def test_the_pose_is_that_of_one_robot() -> None:
     position = scene.feed.controller._robot.pose(1.0).position
     assert position is not None
     assert position[0] == 0.1
+
+
+def test_the_first_robot_begins_nothing_anew() -> None:
+    scene = Scene()
+    begun: list[None] = []
+    scene.feed.controller.begin_robot = lambda: begun.append(None)  # type: ignore[method-assign]
+    scene.feed.on_robot(1.0, source("A", "robot"), robot_at(0.1), {"A"})
+    assert not begun
+    scene.feed.on_robot(1.1, source("B", "robot"), robot_at(0.1), {"B"})
+    assert len(begun) == 1
 
 
 def test_another_robot_that_takes_over_has_no_past() -> None:

@@ -199,8 +199,7 @@ class StepFeed:
         self._on_step(fed)
 
     def _take_clock(self, clock: str, instance: str, now_ns: int) -> None:
-        if clock != self._device.boot:
-            self._device = heard_device(Device(), now_ns / NS_PER_S, clock, instance, pressed=True)
+        self._device = heard_device(Device(), now_ns / NS_PER_S, clock, instance, pressed=True)
         self._clock, self._instance = clock, instance
         self._next = self._fetched_until = 0
 

@@ -35,6 +35,8 @@ class FakeBus:
     def __init__(self, kept: range = range(0), boot: str = "boot-1") -> None:
         self.keys = Keys("cell")
         self.kept, self.boot, self.questions = kept, boot, []
+        self.asked: list[str] = []
+        """Keys of the questions."""
         self.hangs = False
         self.damage: dict[str, Any] = {}
         """Fields of its next answers that are otherwise than they should be."""
@@ -53,6 +55,7 @@ class FakeBus:
         self, key: str, question: LastStepsQuestion, _type: Any, timeout_s: float
     ) -> list[Answer[LastSteps]]:
         self.questions.append(question)
+        self.asked.append(key)
         if self.hangs:
             return []
         indices = [i for i in self.kept if question.before is None or i < question.before]
@@ -278,6 +281,31 @@ def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> N
     assert listener.told[-5:] == [("step", k) for k in range(5)][-5:]
     bus.hear(5)
     assert listener.steps[-1] == 5
+
+
+def test_the_device_that_is_followed_is_the_one_that_is_asked() -> None:
+    bus = FakeBus()
+    Listener(bus)
+    assert "/input_device/*/" in bus.asked[-1]
+    bus.hear(0, instance="a")
+    bus.hear(5, instance="a")
+    assert "/input_device/a/" in bus.asked[-1]
+    bus.boot = "boot-b"
+    bus.pair("boot-b", "b")
+    assert "/input_device/b/" in bus.asked[-1]
+    bus.hear(3, instance="b", boot="boot-b")
+    assert "/input_device/b/" in bus.asked[-1]
+
+
+def test_what_was_fetched_of_the_device_before_excuses_no_repeated_step_of_the_next() -> None:
+    bus = FakeBus(kept=range(50))
+    listener = Listener(bus)
+    bus.kept, bus.boot = range(0), "boot-2"
+    bus.wait(TAKEOVER_S + 0.1)
+    for index in (0, 1, 2, 1):
+        bus.hear(index)
+    assert bus.refused["step"] == 1
+    assert listener.steps[-3:] == [0, 1, 2]
 
 
 def test_a_pairing_without_a_device_leaves_it_to_who_is_heard() -> None:
