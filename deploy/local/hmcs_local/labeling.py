@@ -24,7 +24,7 @@ from hmcs.recordings.stretches import (
     check_within,
     of_seconds,
     relabeled,
-    told,
+    stretch_text,
 )
 from hmcs.shown import plain
 from hmcs.task import Task
@@ -85,7 +85,7 @@ def _check_names(task: Task, labels: Iterable[Stretch], content: RecordingConten
     if wrong:
         raise UserError(
             "\n".join(
-                f"{content.path}: {told(label, content.first_ns)}: "
+                f"{content.path}: {stretch_text(label, content.first_ns)}: "
                 f"{unknown_name_message(f'state of task {task.name}', label.state, known)}"
                 for label in wrong
             )

@@ -31,7 +31,7 @@ class Found(NamedTuple):
     """The template with gestemes g1, g2, … and states s1, s2, …."""
     sources: tuple[Source, ...]
     """With their demonstrations labeled by it."""
-    told: tuple[str, ...]
+    findings: tuple[str, ...]
     """What was found and what should be known of it, a sentence each."""
 
     @property
@@ -54,7 +54,7 @@ def found_states(template: Task, sources: Sequence[Source]) -> Found:
         source._replace(demonstrations=tuple(islice(coming, len(source.demonstrations))))
         for source, _ in kept
     )
-    told = (
+    findings = (
         f"{_several(len(task.states), 'state')} of {_several(len(task.gestemes), 'gesteme')} found "
         f"in {_several(len(given), 'demonstration')}",
         *map(_told, demonstrations),
@@ -62,7 +62,7 @@ def found_states(template: Task, sources: Sequence[Source]) -> Found:
         *discovery.notes,
         *_lost(template),
     )
-    return Found(task, labeled_sources, told)
+    return Found(task, labeled_sources, findings)
 
 
 def check_places(sources: Sequence[Source], task_file: Path) -> None:

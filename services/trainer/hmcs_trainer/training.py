@@ -95,7 +95,7 @@ def train(
 
     The model is called `name`, or as the task is. `recognizer` is the kind to learn for, with
     `settings` of its own as text; of `choices` the best by held-out likelihood is taken, `fits` is
-    told how many of all fits are done. With `report` a page is written that tells what the model is
+    given how many of all fits are done. With `report` a page is written that says what the model is
     worth: each demonstration, or eight of many, is recognized by a model of the others. What is
     random is drawn with `seed`. With `find_states` gestemes and states are found in the motion,
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
@@ -115,7 +115,7 @@ def train(
             refuse([f for d in _shown(sources) for f in implausible(loaded, d) if f.serious])
         found = found_states(loaded, sources)
         loaded, sources = found.task, list(found.sources)
-        noted += [Finding(False, sentence) for sentence in found.told]
+        noted += [Finding(False, sentence) for sentence in found.findings]
     demonstrations = _shown(sources)
     noted += findings(loaded, demonstrations)
     refused = [f for f in noted if f.serious and not (accept_implausible and f.may_be_accepted)]
@@ -157,7 +157,9 @@ def train(
         progress("judging")
         left_out = judged(loaded, demonstrations, chosen, recognizer, fits)
         write_report(Path(report), saved, left_out, advice(saved, left_out), noted)
-        progress(numbers(left_out) if found is None else f"{found.told[0]}; {numbers(left_out)}")
+        progress(
+            numbers(left_out) if found is None else f"{found.findings[0]}; {numbers(left_out)}"
+        )
     return saved
 
 

@@ -116,8 +116,8 @@ def category_likelihoods(known: ForceTask, steps: Sequence[Step]) -> Array:
     rows = _rows(steps, known.observed, known.components)
     unfelt = np.isnan(rows).any(axis=1, keepdims=True)
     standard = (np.where(unfelt, 0.0, rows) - known.center) / known.scale
-    told = likelihoods(known.estimator, standard)
-    return np.where(unfelt, 1.0 / told.shape[1], told)
+    probabilities = likelihoods(known.estimator, standard)
+    return np.where(unfelt, 1.0 / probabilities.shape[1], probabilities)
 
 
 def _rows(

@@ -62,7 +62,7 @@ class GestemeLevelOutput(NamedTuple):
 
 
 def learn_task_level(
-    chain: TaskChain, told: Sequence[GestemeLevelOutput], settings: TaskLevelSettings
+    chain: TaskChain, outputs: Sequence[GestemeLevelOutput], settings: TaskLevelSettings
 ) -> GestemeTaskHmm:
     """Return the task HMM learned from what the gesteme level said of the demonstrations.
 
@@ -70,8 +70,8 @@ def learn_task_level(
     demonstrations never show what follows a state, the network stays. A state without a
     demonstration of its own is taken to look like those it shares gestemes with.
     """
-    runs = [run for each in told for run in _labeled_runs(each)]
-    states, gestemes = len(chain.initial), told[0].gestemes.shape[1]
+    runs = [run for each in outputs for run in _labeled_runs(each)]
+    states, gestemes = len(chain.initial), outputs[0].gestemes.shape[1]
     start = _network(chain, runs)
     seen = np.unique(np.concatenate([run.states for run in runs]))
     learned = learn_task(
@@ -155,14 +155,14 @@ def check_task_hmm(task_hmm: GestemeTaskHmm, states: int, gestemes: int) -> None
         check_distributions(field, array)
 
 
-def _labeled_runs(told: GestemeLevelOutput) -> Iterator[GestemeLevelOutput]:
+def _labeled_runs(output: GestemeLevelOutput) -> Iterator[GestemeLevelOutput]:
     """What was passed up in each stretch without a gap in its labels."""
-    for labeled, run in groupby(range(len(told.states)), lambda t: told.states[t] >= 0):
+    for labeled, run in groupby(range(len(output.states)), lambda t: output.states[t] >= 0):
         steps = list(run)
         if labeled:
             # Baum–Welch needs a transition.
             steps = steps if len(steps) > 1 else steps * 2
-            yield GestemeLevelOutput(told.gestemes[steps], told.states[steps])
+            yield GestemeLevelOutput(output.gestemes[steps], output.states[steps])
 
 
 def _network(chain: TaskChain, runs: Sequence[GestemeLevelOutput]) -> Array:

@@ -94,14 +94,14 @@ def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLev
     )
     if settings.evidence == "none":
         return TwoLevels(gestemes, None, settings.restart, settings.cusum, "none")
-    told = []
+    outputs = []
     for demonstration in data.demonstrations:
         labeled = labeled_steps(task, demonstration)
         classifier = GestemeHmmClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
         passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
-        told.append(GestemeLevelOutput(np.array(passed), labeled.states))
+        outputs.append(GestemeLevelOutput(np.array(passed), labeled.states))
     data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
-    task_hmm = learn_task_level(chain_of(task), told, settings.task)
+    task_hmm = learn_task_level(chain_of(task), outputs, settings.task)
     return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
 
 

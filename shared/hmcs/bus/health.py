@@ -71,7 +71,7 @@ def _problem(arguments: argparse.Namespace) -> str | None:
     except RequestRefusedError as error:
         return f"could not say how it is: {error}"
     within = f"within {arguments.timeout:g} s (router {settings.router})"
-    told = {
+    healths = {
         member: answer.body
         for answer in answers
         if (member := _sender(answer)).service == arguments.service
@@ -80,15 +80,15 @@ def _problem(arguments: argparse.Namespace) -> str | None:
         *(
             f"{member.instance}: is present, but did not answer {within}"
             for member in there
-            if member not in told
+            if member not in healths
         ),
         *(
             f"{member.instance}: {plain(health.detail)}"
-            for member, health in sorted(told.items(), key=itemgetter(0))
+            for member, health in sorted(healths.items(), key=itemgetter(0))
             if not health.healthy
         ),
     ]
-    if not told and not problems:
+    if not healths and not problems:
         return f"nobody answered on {keys.rpc(*asked, HEALTH.name)} {within}"
     return "; ".join(problems) or None
 

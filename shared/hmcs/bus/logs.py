@@ -61,16 +61,16 @@ class Readable(logging.Formatter):
             for name, value in _facts(record).items()
         )
         event = plain(record.getMessage(), _LONGEST_FACT)
-        told = [
+        lines = [
             f"{clock}.{int(record.msecs):03d} {record.levelname.lower():7} "
             f"{self._process}  {event}{facts}"
         ]
         if record.exc_info:
-            told += [
+            lines += [
                 f"  {_indent(line)}{plain(line.strip(), _LONGEST_FACT)}"
                 for line in self.formatException(record.exc_info).split("\n")
             ]
-        return "\n".join(told)
+        return "\n".join(lines)
 
 
 class RateLimitedLog:
@@ -144,8 +144,8 @@ def _facts(record: logging.LogRecord) -> dict[str, Any]:
     return {name: value for name, value in vars(record).items() if name not in _STANDARD}
 
 
-def _kind_in(told: str) -> str:
-    kind = told[:_LONGEST_KIND].partition(": ")[0]
+def _kind_in(reason: str) -> str:
+    kind = reason[:_LONGEST_KIND].partition(": ")[0]
     return kind if "/" in kind else re.sub(r"\d+", "#", kind)
 
 

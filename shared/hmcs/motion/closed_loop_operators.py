@@ -52,7 +52,7 @@ class Habits:
     """From the robot to the eye to the hand."""
     foresight: float = 0.8
     """The share of their own motion since then that operators reckon with: they know what they
-    told their hand, not what became of it (Miall et al. 1993)."""
+    commanded their hand, not what became of it (Miall et al. 1993)."""
     lag_s: float = 0.06
     """Of the arm: time constant of a first-order lag."""
     look_ahead_m: float = 0.008

@@ -62,8 +62,10 @@ class Model(NamedTuple):
     @property
     def turns(self) -> dict[str, OrientationProfile]:
         """How the hand turns along the path of each gesteme that tells."""
-        told = zip(self.gesteme_names, self.path_turns, strict=False)
-        return {name: OrientationProfile(turns) for name, turns in told if turns is not None}
+        turns_by_gesteme = zip(self.gesteme_names, self.path_turns, strict=False)
+        return {
+            name: OrientationProfile(turns) for name, turns in turns_by_gesteme if turns is not None
+        }
 
 
 def axes_of(task: Task) -> tuple[int, ...]:

@@ -81,9 +81,9 @@ def choose(
             model = learn(
                 task, kept, settings, recognizer=recognizer, rng=np.random.default_rng(seed)
             )
-            told = _log_probabilities(model, left)
-            means.append(float(told.mean()))
-            weights.append(len(told))
+            log_probabilities = _log_probabilities(model, left)
+            means.append(float(log_probabilities.mean()))
+            weights.append(len(log_probabilities))
             done += 1
             progress(done, total)
         spread = float(np.std(means, ddof=1) / np.sqrt(len(means))) if len(means) > 1 else 0.0

@@ -111,8 +111,8 @@ def _row(message: Recorded, first_ns: int) -> Row | None:
         fields = message.fields
     except NoMessageError:
         return None
-    told = {name: value for name, value in fields.items() if name not in _ENVELOPE}
-    return {"time_s": (message.log_ns - first_ns) / 1e9, **dict(_flat(told))}
+    body = {name: value for name, value in fields.items() if name not in _ENVELOPE}
+    return {"time_s": (message.log_ns - first_ns) / 1e9, **dict(_flat(body))}
 
 
 def _flat(fields: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -69,7 +69,7 @@ def inspected(content: RecordingContent) -> Inspection:
     summaries = tuple(
         channel.summary(key, schema) for (key, schema), channel in sorted(channels.items())
     )
-    problems = [*damages(content), *unreadable.told(), *_problems(content, summaries)]
+    problems = [*damages(content), *unreadable.problems(), *_problems(content, summaries)]
     return Inspection(content.duration_s, summaries, tuple(problems))
 
 
@@ -91,7 +91,7 @@ def unread(content: RecordingContent, *message_types: type[Message]) -> tuple[st
     schemas = [schema for schema in content.schemas if readable_as(schema) in message_types]
     for message in content.messages.of_schemas(schemas):
         unreadable.note(message.key, _read(message).why)
-    return tuple(unreadable.told())
+    return tuple(unreadable.problems())
 
 
 class _Read(NamedTuple):
@@ -122,7 +122,7 @@ class _Unreadable:
             self._counts[key] += 1
             self._why.setdefault(key, why)
 
-    def told(self) -> Iterator[str]:
+    def problems(self) -> Iterator[str]:
         for key, count in sorted(self._counts.items()):
             yield _unread(count, key, self._why[key])
 

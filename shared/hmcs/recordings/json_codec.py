@@ -102,8 +102,8 @@ def _type_in(payload: bytes) -> type[Message]:
                 break
             unpacker.skip()
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        told = str(error) or type(error).__name__
-        raise NoMessageError(f"not a msgpack map of fields: {told}") from error
+        reason = str(error) or type(error).__name__
+        raise NoMessageError(f"not a msgpack map of fields: {reason}") from error
     message_type = BY_SCHEMA.get(schema) if isinstance(schema, str) else None
     if message_type is None:
         raise NoMessageError(f"schema {str(schema)[:64]!r} is none of this contract")

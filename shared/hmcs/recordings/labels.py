@@ -19,7 +19,7 @@ from hmcs.recordings.fingerprints import fingerprint_of, is_of
 from hmcs.recordings.generated_marker import is_unchanged_generated, with_generated_marker
 from hmcs.recordings.label_files import MOST_LABELS, LabelFile, labels_text, read_labels
 from hmcs.recordings.reading import RecordingContent, RecordingError
-from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, to_ns, told
+from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, stretch_text, to_ns
 from hmcs.whole_files import written_whole
 
 SUFFIX = ".labels.csv"
@@ -72,8 +72,8 @@ def label_notes(content: RecordingContent) -> tuple[str, ...]:
         )
     _check_times(content, beside)
     return tuple(
-        f"{name}:{line}: label {told(stretch, content.first_ns)} ends after the recording, which "
-        f"lasts {content.duration_s:.3f} s"
+        f"{name}:{line}: label {stretch_text(stretch, content.first_ns)} ends after the "
+        f"recording, which lasts {content.duration_s:.3f} s"
         for stretch, line in zip(beside.stretches, beside.lines, strict=True)
         if ends_after(stretch, content.last_ns)
     )
@@ -149,7 +149,7 @@ def _check_times(content: RecordingContent, written: LabelFile) -> None:
         outside = stretch.begin_ns >= content.last_ns or stretch.begin_ns < content.first_ns
         if outside or ends_after(stretch, content.last_ns + to_ns(FAR_BEYOND_S)):
             raise RecordingError(
-                f"{file}:{line}: label {told(stretch, content.first_ns)} is outside of the "
+                f"{file}:{line}: label {stretch_text(stretch, content.first_ns)} is outside of the "
                 f"recording, which lasts {content.duration_s:.3f} s: label what is in it"
             )
 

@@ -18,7 +18,7 @@ HMCS = "hmcs."
 CHANNEL_TOLD = "hmcs/channel"
 """A metadata record of this name says what a channel is, as a chunk says it too: where that chunk
 is damaged, messages in the others are still known."""
-LARGEST_TOLD_BYTES = 16 * 1024 * 1024
+LARGEST_TEXT_BYTES = 16 * 1024 * 1024
 """Of all names and metadata in a file, which are held while it is used, and of each record of them;
 those of a whole stack have some hundred kilobytes."""
 
@@ -60,20 +60,20 @@ class TextBudget:
     """Counts what is held of a file's own words."""
 
     def __init__(self) -> None:
-        self._left = LARGEST_TOLD_BYTES
+        self._left = LARGEST_TEXT_BYTES
 
     def hold(self, *words: str) -> None:
         """Note some more; DamageError where it is too much."""
         self._left -= sum(len(word) + 64 for word in words)
         if self._left < 0:
-            raise DamageError(f"more than {LARGEST_TOLD_BYTES / 1e6:.0f} MB of names and metadata")
+            raise DamageError(f"more than {LARGEST_TEXT_BYTES / 1e6:.0f} MB of names and metadata")
 
 
 class Channels:
     """The channels described so far; the first description of a number counts."""
 
-    def __init__(self, told: TextBudget) -> None:
-        self._told = told
+    def __init__(self, budget: TextBudget) -> None:
+        self._budget = budget
         self._schemas: dict[int, str] = {0: ""}
         self._channels: dict[int, Channel] = {}
         self.topics: dict[int, str] = {}
@@ -92,7 +92,7 @@ class Channels:
             if opcode == Opcode.SCHEMA:
                 schema = mcap.Schema.read(Strict(content))
                 if schema.id not in self._schemas:
-                    self._told.hold(schema.name)
+                    self._budget.hold(schema.name)
                     self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
                 channel = mcap.Channel.read(Strict(content))
@@ -100,7 +100,7 @@ class Channels:
                     name = self._schemas[channel.schema_id]
                     self.add(channel.id, Channel(channel.topic, name, channel.message_encoding))
                 elif channel.id not in self.topics:
-                    self._told.hold(channel.topic)
+                    self._budget.hold(channel.topic)
                     self.topics[channel.id] = channel.topic
         except (McapError, struct.error, ValueError, OverflowError) as error:
             raise DamageError(f"a damaged description of a channel ({error})") from error
@@ -108,5 +108,5 @@ class Channels:
     def add(self, number: int, channel: Channel) -> None:
         """Take in what a channel is, unless it is known; DamageError where it is too much."""
         if number not in self._channels:
-            self._told.hold(*channel)
+            self._budget.hold(*channel)
             self._channels[number] = channel

@@ -40,7 +40,7 @@ class Index(NamedTuple):
     """Messages by channel; empty where it does not say."""
 
 
-def index_of(stream: BinaryIO, size: int, told: TextBudget) -> Index | None:
+def index_of(stream: BinaryIO, size: int, budget: TextBudget) -> Index | None:
     """Return the index of a file of `size` bytes; None where it has none.
 
     Raises DamageError for one that cannot be used.
@@ -66,13 +66,13 @@ def index_of(stream: BinaryIO, size: int, told: TextBudget) -> Index | None:
     if crc and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != crc:
         raise DamageError(_DAMAGED)
     try:
-        return _index(at, data, told)
+        return _index(at, data, budget)
     except (DamageError, McapError, struct.error, ValueError, OverflowError) as error:
         raise DamageError(_DAMAGED) from error
 
 
-def _index(at: int, data: bytes, told: TextBudget) -> Index:
-    channels, places, counts = Channels(told), array("Q"), {}
+def _index(at: int, data: bytes, budget: TextBudget) -> Index:
+    channels, places, counts = Channels(budget), array("Q"), {}
     for opcode, begin, end in records_in(data):
         if opcode in _PLACE:
             (place,) = struct.unpack_from("<Q", data, begin + _PLACE[opcode])

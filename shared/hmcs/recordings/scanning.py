@@ -15,7 +15,7 @@ from hmcs.recordings.gaps import Gap, Gaps
 from hmcs.recordings.mcap_channels import (
     CHANNEL_TOLD,
     HMCS,
-    LARGEST_TOLD_BYTES,
+    LARGEST_TEXT_BYTES,
     Channel,
     Channels,
     Strict,
@@ -252,15 +252,15 @@ class _Scanner:
         return guess
 
     def _words(self, record: Record) -> None:
-        if record.end - record.content > LARGEST_TOLD_BYTES:
-            raise DamageError(f"a record of words of more than {LARGEST_TOLD_BYTES / 1e6:.0f} MB")
+        if record.end - record.content > LARGEST_TEXT_BYTES:
+            raise DamageError(f"a record of words of more than {LARGEST_TEXT_BYTES / 1e6:.0f} MB")
         content = self._file.read(record.content, record.end)
         try:
             if record.opcode == Opcode.HEADER:
                 self._scan.library = mcap.Header.read(Strict(content)).library
             elif record.opcode == Opcode.METADATA:
-                told = mcap.Metadata.read(Strict(content))
-                self._metadata(told.name, told.metadata)
+                metadata = mcap.Metadata.read(Strict(content))
+                self._metadata(metadata.name, metadata.metadata)
             else:
                 self._channels.take(record.opcode, content)
         except (McapError, struct.error, ValueError, OverflowError) as error:

@@ -83,8 +83,9 @@ def of_seconds(
     for one, other in pairwise(stretches):
         if other.begin_ns < one.end_ns:
             raise LabelError(
-                f"label {told(other, first_ns)} begins before {told(one, first_ns)} ends: let each "
-                "end where the next one begins, in the order of time"
+                f"label {stretch_text(other, first_ns)} begins before "
+                f"{stretch_text(one, first_ns)} ends: let each end where the next one begins, "
+                "in the order of time"
             )
     return tuple(stretches)
 
@@ -94,7 +95,7 @@ def check_within(stretches: Iterable[Stretch], first_ns: int, last_ns: int) -> N
     for stretch in stretches:
         if stretch.begin_ns < first_ns or ends_after(stretch, last_ns):
             raise LabelError(
-                f"label {told(stretch, first_ns)} is outside of the recording, which lasts "
+                f"label {stretch_text(stretch, first_ns)} is outside of the recording, which lasts "
                 f"{(last_ns - first_ns) / NS_PER_S:.3f} s: label what is in it"
             )
 
@@ -134,7 +135,7 @@ def to_ns(seconds: float) -> int:
     return round(seconds * NS_PER_S)
 
 
-def told(stretch: Stretch, first_ns: int = 0) -> str:
+def stretch_text(stretch: Stretch, first_ns: int = 0) -> str:
     """Return a stretch as people read it, in seconds since `first_ns`."""
     begin_s, end_s = ((at - first_ns) / NS_PER_S for at in stretch[:2])
     return f"{stretch.state!r} from {begin_s:.3f} s to {end_s:.3f} s"
@@ -142,9 +143,9 @@ def told(stretch: Stretch, first_ns: int = 0) -> str:
 
 def _check_one(stretch: Stretch, first_ns: int = 0) -> None:
     if not stretch.state or not stretch.state.isprintable():
-        raise LabelError(f"label {told(stretch, first_ns)}: give it the name of a state")
+        raise LabelError(f"label {stretch_text(stretch, first_ns)}: give it the name of a state")
     if stretch.begin_ns >= stretch.end_ns:
-        raise LabelError(f"label {told(stretch, first_ns)}: let it begin before it ends")
+        raise LabelError(f"label {stretch_text(stretch, first_ns)}: let it begin before it ends")
 
 
 def _joined(stretches: Iterable[Stretch]) -> tuple[Stretch, ...]:

@@ -124,7 +124,7 @@ def test_a_sender_of_many_words_is_cut_short(tmp_path: Path) -> None:
     words = record(12, text("n" * 1000) + text("")[:4])
     path = file_of(tmp_path / "words.mcap", words * 30_000)
     content = read(path)
-    assert sum(map(len, content.metadata)) < mcap_channels.LARGEST_TOLD_BYTES
+    assert sum(map(len, content.metadata)) < mcap_channels.LARGEST_TEXT_BYTES
 
 
 # --- files that are none --------------------------------------------------------------------------

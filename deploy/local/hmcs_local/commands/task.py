@@ -26,9 +26,9 @@ def check(
     check_workspace(file, task)
     shown = ""
     if demonstrations:
-        count, told = checked(task, demonstrations, typer.echo)
+        count, findings = checked(task, demonstrations, typer.echo)
         shown = f"; {count} demonstrations agree" + (
-            ", apart from the findings above" if told else ""
+            ", apart from the findings above" if findings else ""
         )
     counts = f"{len(task.gestemes)} gestemes, {len(task.states)} states"
     typer.echo(f"{file}: in order: {counts}{shown}")

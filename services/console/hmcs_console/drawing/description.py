@@ -50,7 +50,7 @@ def tidy(urdf: str, files: Mapping[str, str]) -> bytes:
         _copy_material(material, robot)
     for link in links.values():
         own = SubElement(robot, "link", name=link.name)
-        for visual in link.told.findall("visual"):
+        for visual in link.element.findall("visual"):
             _copy_visual(visual, own, files)
     for joint in described.findall("joint"):
         _copy_joint(joint, robot, links)
@@ -111,7 +111,7 @@ _NONE = Element("none")
 class _Link(NamedTuple):
     name: str
     """In the description that is made."""
-    told: Element
+    element: Element
 
 
 def _links(robot: Element) -> Mapping[str, _Link]:

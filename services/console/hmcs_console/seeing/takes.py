@@ -21,8 +21,8 @@ from hmcs.recordings.stretches import (
     cleared,
     of_seconds,
     relabeled,
+    stretch_text,
     to_ns,
-    told,
 )
 from hmcs_console.shapes.palette import UNKNOWN, Color, color_of
 from hmcs_console.shapes.pieces import Pieces
@@ -95,7 +95,7 @@ def labeled(take: Take, state: str) -> Take:
     begin_s, end_s = take.chosen_s
     new = Stretch(to_ns(begin_s), to_ns(end_s), state)
     try:
-        return _edited(take, relabeled(take.labels, new), told(new))
+        return _edited(take, relabeled(take.labels, new), stretch_text(new))
     except LabelError as error:
         return take._replace(said=str(error))
 

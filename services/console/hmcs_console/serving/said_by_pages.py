@@ -110,15 +110,19 @@ def said(data: bytes) -> bytes:
     of this console does not say.
     """
     try:
-        told: Any = msgpack.unpackb(data, max_ext_len=0)
+        content: Any = msgpack.unpackb(data, max_ext_len=0)
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
         raise HostileError(f"no message: {type(error).__name__}") from None
     try:
-        read = _SAID.validate_python(told)
+        read = _SAID.validate_python(content)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         what = f"{first['msg']} at {'.'.join(map(str, first['loc']))}"
-        if isinstance(told, dict) and told.get("type") in _POSES and told.keys() <= _POSE_FIELDS:
+        if (
+            isinstance(content, dict)
+            and content.get("type") in _POSES
+            and content.keys() <= _POSE_FIELDS
+        ):
             raise NonsenseError(what) from None
         raise HostileError(what) from None
     packed = msgpack.packb(read.model_dump())

@@ -141,9 +141,9 @@ def said(takeover: Takeover | None, now_s: float) -> Markdown:
             return Markdown("{} is being loaded …").format(name)
         case "comparing":
             left_s = math.ceil(max(takeover.until_s - now_s, 0.0))
-            told = Markdown("{} runs beside {}: {}, active in {} s")
-            told = told.format(name, before, _agreed(takeover), left_s)
-            return _LINES.join([told, *takeover.loaded])
+            text = Markdown("{} runs beside {}: {}, active in {} s")
+            text = text.format(name, before, _agreed(takeover), left_s)
+            return _LINES.join([text, *takeover.loaded])
         case "activating":
             return Markdown("{} is being activated …").format(name)
         case "done":
@@ -153,8 +153,8 @@ def said(takeover: Takeover | None, now_s: float) -> Markdown:
             return _LINES.join([*lines, *takeover.loaded])
         case "failed":
             still = Markdown(", {} is active still" if before else "").format(before)
-            told = Markdown("{} did not take over{}: {}")
-            return told.format(name, still, takeover.detail)
+            text = Markdown("{} did not take over{}: {}")
+            return text.format(name, still, takeover.detail)
 
 
 def _agreed(takeover: Takeover) -> str:

@@ -16,11 +16,11 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 """Along x, y and z, and against them."""
 
 
-def reasons(told: Reasons | None) -> Markdown:
+def reasons(given: Reasons | None) -> Markdown:
     """Return what is known of the likely state and of those that might take over."""
-    if told is None:
+    if given is None:
         return Markdown("")
-    parts = (_along(told), _supported(told), _changing(told))
+    parts = (_along(given), _supported(given), _changing(given))
     return Markdown("\n\n").join(part for part in parts if part)
 
 

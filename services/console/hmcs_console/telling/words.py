@@ -73,8 +73,8 @@ def recognizers(
         ]
     for name, agreed in agreement.items():
         if agreed.compared:
-            told = Markdown("{} agrees in {:.0%} of {} steps")
-            lines.append(told.format(name, agreed.same / agreed.compared, agreed.compared))
+            line = Markdown("{} agrees in {:.0%} of {} steps")
+            lines.append(line.format(name, agreed.same / agreed.compared, agreed.compared))
         else:
             lines.append(Markdown("{} has no step in common with it yet").format(name))
     return _LINES.join(lines)

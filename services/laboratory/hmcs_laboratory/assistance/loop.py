@@ -128,7 +128,7 @@ def perform(
         )
         states.append(state)
         robot.move(fixture.command_twist, period_s)
-    robot_at, hand_velocity, intended, command, passed, force, told = (
+    robot_at, hand_velocity, intended, command, passed, force, fixture_values = (
         np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)
     )
     return Run(
@@ -140,10 +140,10 @@ def perform(
         command=command,
         passed=passed,
         force=force,
-        progress_m=told[:, 0],
-        factor=told[:, 1],
+        progress_m=fixture_values[:, 0],
+        factor=fixture_values[:, 1],
         states=tuple(states),
-        confidence=told[:, 2],
+        confidence=fixture_values[:, 2],
         steps=tuple(steps),
         step_at=np.array(step_at, dtype=np.int64),
         touched=robot.touched,

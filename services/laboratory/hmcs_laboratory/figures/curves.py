@@ -294,13 +294,13 @@ def _drawn(
         numbers[f"{kind}_{method}{CI95}"] = [points[value].half for value in values]
     shown = _shown(settings)
 
-    def told(value: float, methods: Sequence[str]) -> str:
+    def ranges(value: float, methods: Sequence[str]) -> str:
         return _numbers([curves[shown, method][value].mean for method in methods])
 
     ends = dict.fromkeys((values[0], values[len(values) // 2], values[-1]))
     parts = [
-        f"{before} {value:g}: {told(value, FLOORED)} (no floor {told(value, UNFLOORED)}), ours "
-        f"{told(value, [OURS])}"
+        f"{before} {value:g}: {ranges(value, FLOORED)} (no floor {ranges(value, UNFLOORED)}), ours "
+        f"{ranges(value, [OURS])}"
         for value in ends
     ]
     overall = {

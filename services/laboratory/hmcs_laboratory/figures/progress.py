@@ -25,7 +25,7 @@ def figures_shown(console: Console) -> Iterator[Told]:
     ) as bar:
         task = bar.add_task("figures", total=None)
 
-        def told(number: str, done: int, total: int) -> None:
+        def report(number: str, done: int, total: int) -> None:
             bar.update(task, completed=done, total=total, description=f"figure {number} made")
 
-        yield told
+        yield report

@@ -166,8 +166,8 @@ def _found(
         f"steps. The layered HMM, restarted at the true changes, had {_percent(lhmm[0])} of "
         f"{what} right and saw the changes {_delays(lhmm[0])} late. The two most probable "
         f"differed by {margin_of(followed.states):.2f} on average for its states, by "
-        f"{followed.margin_of_gestemes:.2f} for the gesteme HMMs. {fall}The segment filter, told "
-        f"nothing, had {_percent(unmarked[0])} right and saw the changes {_delays(unmarked[0])} "
+        f"{followed.margin_of_gestemes:.2f} for the gesteme HMMs. {fall}The segment filter, given "
+        f"no changes, had {_percent(unmarked[0])} right and saw the changes {_delays(unmarked[0])} "
         f"late. Over all {len(lhmm)} performances: layered HMM {_pooled(lhmm)}; segment "
         f"filter {_pooled(unmarked)}."
     )
@@ -182,7 +182,7 @@ def _differs(
     by_gesteme: bool,
 ) -> str:
     wrong = int((followed.winners != truth).sum())
-    told = [
+    sentences = [
         f"The wrong gesteme won in {counted(wrong, 'step')}."
         if wrong
         else "The thesis has the wrong gesteme win at times; here it never did."
@@ -190,19 +190,19 @@ def _differs(
     if by_gesteme:
         longest = pooled(scores["lhmm"]).switch_delays.max()
         hurried = pooled(scores["eager_lhmm"]).switch_delays.max()
-        told.append(
+        sentences.append(
             "The thesis sees a significant delay where the order leaves the trained one. Here the "
             f"longest in all performances is {counted(int(longest), 'step')}; were any state "
             f"allowed to follow with {settings.eager_any_state:g} a step instead of "
             f"{settings.any_state:g}, {counted(int(hurried), 'step')}. Right is a belief whose "
             "gesteme is right: each serves two states, and of an order never seen no more is true."
         )
-    told.append(
+    sentences.append(
         "Likelihoods are drawn on a logarithmic scale. The bottom panel is not in the thesis: it "
         "is a recognizer given no changes, which therefore sees some before they come, as "
         "the hand rounds a corner, and some after."
     )
-    return " ".join(told)
+    return " ".join(sentences)
 
 
 def _scored(name: str, scores: Scores) -> dict[str, Number]:

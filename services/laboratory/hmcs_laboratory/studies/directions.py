@@ -172,7 +172,7 @@ def _sure_delays(lines: Integers, believed: Array, nearest: Integers, sure: floa
     """Steps from every change of line to P(its direction) > `sure`; never counts as all its steps.
 
     `nearest` is the direction of each line. A line whose direction is that of the line before is
-    never told.
+    never announced.
     """
     edges = [0, *(np.flatnonzero(np.diff(lines)) + 1).tolist(), len(lines)]
     delays = []

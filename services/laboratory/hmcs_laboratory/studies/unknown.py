@@ -204,7 +204,7 @@ def _segment_filter(data: TaskSet, rng: np.random.Generator) -> _Method:
     return _Method(
         lambda: recognizer_of(model),
         segment_filter_model(model).alarm.window_steps,
-        lambda told: np.array([each.mean_log_likelihood for each in told]),
+        lambda beliefs: np.array([each.mean_log_likelihood for each in beliefs]),
         alarms=True,
     )
 

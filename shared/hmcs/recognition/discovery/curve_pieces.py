@@ -53,8 +53,8 @@ def stretches_of(path: Array, least_steps: int) -> Stretches:
     first, last = np.triu_indices(count, min(max(least_steps, 1), count - 1))
     begin = np.where(first > 0, first + _TRIM, first)
     end = np.where(last < count - 1, last - _TRIM, last) + 1
-    told = (end - begin >= 3) | (last - first == count - 1)
-    first, last, begin, end = first[told], last[told], begin[told], end[told]
+    clear = (end - begin >= 3) | (last - first == count - 1)
+    first, last, begin, end = first[clear], last[clear], begin[clear], end[clear]
     points = (end - begin).astype(float)
 
     def summed(values: NDArray[Any]) -> NDArray[Any]:

@@ -164,8 +164,8 @@ class GestemeBank:
                 self._aligned, similarity, gesteme, where, direction
             )
         if self._parameters.senses.names:
-            told = log_densities(self._parameters.senses, self._reader.step(step))
-            log_emission += told.take(gesteme, axis=0)
+            log_density = log_densities(self._parameters.senses, self._reader.step(step))
+            log_emission += log_density.take(gesteme, axis=0)
         top = log_emission.max(axis=1)
         joint = phase * np.exp(log_emission - top[:, None])
         total = np.maximum(joint.sum(axis=1), 1e-300)

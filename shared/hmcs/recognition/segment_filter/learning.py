@@ -158,8 +158,8 @@ def _fits(
             task_filter.step(bank.step(step))
             for step in _performed(_in_task_order(task, fold.segments))
         ]
-        told = np.array([(belief.log_likelihood, belief.unknown) for belief in beliefs])
-        result.append(fit_of(told[:, 0], told[:, 1]))
+        series = np.array([(belief.log_likelihood, belief.unknown) for belief in beliefs])
+        result.append(fit_of(series[:, 0], series[:, 1]))
     return result
 
 
