@@ -107,8 +107,13 @@ def test_without_leave_nothing_is_downloaded_and_one_line_says_how_to_give_it(
     machine.has("python3", OTHER_PYTHON)
     done = machine.find_python(*asked)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    for told in (*asked, "needs CPython 3.11", "PYTHON=/path/to/python3.11", "demo PYTHON=auto"):
-        assert told in done.stderr
+    for reported in (
+        *asked,
+        "needs CPython 3.11",
+        "PYTHON=/path/to/python3.11",
+        "demo PYTHON=auto",
+    ):
+        assert reported in done.stderr
     assert machine.noted("uv-called") == []
 
 
@@ -147,7 +152,7 @@ def _no_network(machine: Machine) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "told"),
+    ("state", "reported"),
     [
         (_nothing_at_all, "could not get uv"),
         (_no_venv, "could not get uv"),
@@ -155,12 +160,12 @@ def _no_network(machine: Machine) -> None:
     ],
 )
 def test_download_that_fails_says_why_and_leaves_nothing(
-    machine: Machine, state: Callable[[Machine], None], told: str
+    machine: Machine, state: Callable[[Machine], None], reported: str
 ) -> None:
     state(machine)
     done = machine.find_python("auto")
     assert (done.returncode, done.stdout) == (1, "")
-    assert told in done.stderr.splitlines()[-1]
+    assert reported in done.stderr.splitlines()[-1]
     assert list((machine.folder / "tmp").iterdir()) == []
 
 

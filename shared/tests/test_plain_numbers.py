@@ -42,13 +42,13 @@ def test_what_people_write_is_read(text: str, number: float) -> None:
         ),
     ],
 )
-def test_what_is_no_number_is_told(text: str) -> None:
+def test_what_is_no_number_is_reported(text: str) -> None:
     with pytest.raises(ValueError, match="expected a number"):
         number_in(text)
 
 
 @pytest.mark.parametrize("text", ["nan", "NaN", "-inf", "Infinity", "+INFINITY", "1e999", "-1e400"])
-def test_what_is_not_finite_is_told(text: str) -> None:
+def test_what_is_not_finite_is_reported(text: str) -> None:
     with pytest.raises(ValueError, match="expected a finite number"):
         number_in(text)
 

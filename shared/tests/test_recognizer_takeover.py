@@ -68,7 +68,7 @@ def test_what_was_forgotten_is_not_compared() -> None:
     assert shadows.agreement("active") == {}
 
 
-def test_agreement_is_told_as_a_share_of_the_steps_that_were_compared() -> None:
+def test_agreement_is_reported_as_a_share_of_the_steps_that_were_compared() -> None:
     assert str(Agreement(same=3, compared=4)) == "the same likely state in 75% of 4 steps"
     assert str(NOTHING_COMPARED) == "nothing was compared"
 

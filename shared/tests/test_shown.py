@@ -114,8 +114,10 @@ def test_in_a_figure_dollar_signs_enclose_no_formula() -> None:
 
 
 def test_only_the_author_of_markdown_sets_its_marks() -> None:
-    told = Markdown("**{}** {:.0%} {name}: {}").format("<b>*", 0.5, Markdown("*so*"), name="{0}")
-    assert told == "**&#60;b&#62;&#42;** 50% &#123;0&#125;: *so*"
+    reported = Markdown("**{}** {:.0%} {name}: {}").format(
+        "<b>*", 0.5, Markdown("*so*"), name="{0}"
+    )
+    assert reported == "**&#60;b&#62;&#42;** 50% &#123;0&#125;: *so*"
     assert Markdown("  \n").join(["a*", Markdown("*b*")]) == "a&#42;  \n*b*"
     assert Markdown("*a*") + "*b*" == "*a*&#42;b&#42;"
     assert isinstance(Markdown("a") + "b", Markdown)
@@ -130,5 +132,5 @@ def test_a_template_looks_nothing_up_in_what_it_is_filled_with() -> None:
 
 @given(TEXTS, TEXTS)
 def test_what_fills_a_template_comes_out_as_it_reads(one: str, other: str) -> None:
-    told = Markdown("{} and {other}").format(one, other=other)
-    assert read_back(told) == f"{plain(one)} and {plain(other)}"
+    reported = Markdown("{} and {other}").format(one, other=other)
+    assert read_back(reported) == f"{plain(one)} and {plain(other)}"

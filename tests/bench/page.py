@@ -78,8 +78,8 @@ def measure(span_s: float) -> list[Figure]:
                     seen += _delays(bus, commands, span_s)
                     (after_s,), lasted_s = cpu_s([console]), time.monotonic() - began_s
                     shares.append((after_s - before_s) / lasted_s)
-                    told = stack.health(console).detail.split()
-                    rates.append(float(told[told.index("Hz,") - 1]))
+                    reported = stack.health(console).detail.split()
+                    rates.append(float(reported[reported.index("Hz,") - 1]))
     floor_ms = percentile_ms(alone, 50)
     figures = [
         Figure("two hops without page and recorder, p50", floor_ms, "ms"),

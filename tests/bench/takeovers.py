@@ -111,8 +111,8 @@ def _is_near(at_s: float, gap_s: float, moments_s: list[float]) -> bool:
 
 
 def _missing_steps(running: Running) -> int:
-    told = {received.body.step for received in running.beliefs}
-    return max(told) + 1 - min(told) - len(told) if told else 0
+    reported = {received.body.step for received in running.beliefs}
+    return max(reported) + 1 - min(reported) - len(reported) if reported else 0
 
 
 def _steps_of_k(running: Running) -> list[float]:

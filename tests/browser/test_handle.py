@@ -86,9 +86,11 @@ def test_a_page_closed_in_mid_motion_lets_the_robot_stand_in_time(
     viewer.page.close()
     closed_ns = time.monotonic_ns()
     operated_slowly.stack.until(lambda: heard.robot[-1][0] > closed_ns + 1e9)
-    released_ns = next(at for at, told in heard.handles if at > asked_ns and not told.dead_man)
-    before = [told for at, told in heard.robot if at < released_ns][-1]
-    moving_ns = [at for at, told in heard.robot if speed_of(told) >= STANDING_M_S][-1]
+    released_ns = next(
+        at for at, reported in heard.handles if at > asked_ns and not reported.dead_man
+    )
+    before = [reported for at, reported in heard.robot if at < released_ns][-1]
+    moving_ns = [at for at, reported in heard.robot if speed_of(reported) >= STANDING_M_S][-1]
     stood_ns = next(at for at, _ in heard.robot if at > moving_ns)
     times = {"closed": closed_ns, "released": released_ns, "stood": stood_ns}
     for what, at_ns in times.items():
@@ -125,7 +127,7 @@ def test_stop_on_a_page_stops_a_robot_that_another_device_drives(
     )
     stack.until(lambda: heard.speed > MOVING_M_S)
     viewer.press("Stop")
-    stack.until(lambda: any(told.stop == "asked" for _, told in heard.robot))
+    stack.until(lambda: any(reported.stop == "asked" for _, reported in heard.robot))
     until_stands(following)
     viewer.until(lambda: viewer.sees("stands until the operator lets go and takes hold again"))
     # Who plays a recording has let go, and does not take hold again by itself.
@@ -152,13 +154,13 @@ def test_a_handle_kept_to_a_plane_moves_the_tool_within_it_only(
     until_stands(operated)
     assert abs(heard.tool[2] - began[2]) < 1e-3
     # Where the arrow out of the plane was there is none any more.
-    told = len(heard.handles)
+    reported = len(heard.handles)
     foot = viewer.reach_for_handle(UP)
     for share in (0.5, 1.0):
         viewer.lift_to(foot, share * LIFTED_M)
         stack.elapse(0.2)
     viewer.let_go()
-    assert len(heard.handles) == told
+    assert len(heard.handles) == reported
     # In another plane there is, and scaled it leads half as far.
     viewer.choose("Keep to", "plane x z")
     viewer.write("Scale", "0.5")

@@ -114,8 +114,8 @@ def shown(browser: Any, stack: Stack) -> Cell:
 
 def on_page(viewer: Viewer) -> str:
     """What a person can read, blanks run together."""
-    told = viewer.page.evaluate(LOOK)
-    return " ".join(str(told).replace(JOINER, "").split())
+    reported = viewer.page.evaluate(LOOK)
+    return " ".join(str(reported).replace(JOINER, "").split())
 
 
 def until_read(viewer: Viewer, text: str, after: str = "", press: str = "") -> None:
@@ -127,10 +127,10 @@ def until_read(viewer: Viewer, text: str, after: str = "", press: str = "") -> N
         if time.monotonic() >= press_s:
             viewer.press(press)
             press_s = time.monotonic() + PRESSED_AGAIN_S
-        told = on_page(viewer)
-        if any(said in told for said in wanted):
+        reported = on_page(viewer)
+        if any(said in reported for said in wanted):
             return
-        assert time.monotonic() < deadline_s, f"none of {wanted} can be read on {told!r}"
+        assert time.monotonic() < deadline_s, f"none of {wanted} can be read on {reported!r}"
         viewer.cell.stack.elapse(AGAIN_S)
 
 
@@ -205,8 +205,8 @@ def test_names_that_are_none_end_nothing_and_are_not_seen(
     viewer = open_viewer(shown, bypass_csp=True)
     viewer.open_tab("Services")
     viewer.until(lambda: "robot stranger" in on_page(viewer), DRAWN_S)
-    told = on_page(viewer)
-    assert not any(word in told for word in ("evil", "onerror", "yyy"))
+    reported = on_page(viewer)
+    assert not any(word in reported for word in ("evil", "onerror", "yyy"))
     is_harmless(viewer)
 
 

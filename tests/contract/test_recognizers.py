@@ -41,8 +41,8 @@ def assert_equal(some: list[Recognition], others: list[Recognition]) -> None:
         assert one._replace(belief=None, evidence=None) == other._replace(
             belief=None, evidence=None
         )
-        for told, expected in zip(one.evidence or (), other.evidence or (), strict=True):
-            np.testing.assert_array_equal(told, expected)
+        for reported, expected in zip(one.evidence or (), other.evidence or (), strict=True):
+            np.testing.assert_array_equal(reported, expected)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -13,7 +13,7 @@ from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.segment_filter.recognizer import SegmentFilterRecognizer
-from support.hand import Scene, told
+from support.hand import Scene, reported
 
 PATIENT = ("--deadline-ms", "1000")
 """Where equality is promised, not speed: a busy machine must not degrade a belief."""
@@ -38,7 +38,7 @@ def assert_same(
             "log_likelihood": within.log_likelihood,
             "mean_log_likelihood": recognition.mean_log_likelihood,
         }
-        for what, value in told(over).items():
+        for what, value in reported(over).items():
             np.testing.assert_allclose(value, in_process[what], rtol=0, atol=to, err_msg=what)
 
 

@@ -50,8 +50,8 @@ def test_models_take_over_one_after_another_without_a_gap_and_come_back(
     assert [d.model for d in read_history(folder).deployed] == ["human-shapes", "shadow"]
     recognizers = [p for p in running.stack.instances("recognizer") if p.running]
     assert len(recognizers) == 2
-    told = {received.body.step for received in running.beliefs}
-    assert told == set(range(min(told), max(told) + 1))
+    reported = {received.body.step for received in running.beliefs}
+    assert reported == set(range(min(reported), max(reported) + 1))
     gaps = np.diff([received.received_ns for received in running.commands]) / 1e9
     # A recognizer takes longer to start than that: the commands do not wait for it. How long they
     # may wait on an idle machine is for the bench.

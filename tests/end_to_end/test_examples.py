@@ -122,7 +122,7 @@ def test_a_program_without_hmcs_hears_beliefs(
     assert 0.0 <= float(probability) <= 1.0
 
 
-def test_a_recording_is_told_in_numbers_and_as_demonstrations(tmp_path: Path) -> None:
+def test_a_recording_is_reported_in_numbers_and_as_demonstrations(tmp_path: Path) -> None:
     file = tmp_path / "kept.mcap"
     file.write_bytes(lzma.decompress(KEPT.read_bytes()))
     lines = run("08_read_recording.py", file, folder=tmp_path)

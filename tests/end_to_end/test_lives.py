@@ -36,10 +36,10 @@ def assert_ends(process: StackProcess, how: signal.Signals) -> None:
     process.send(how)
     code = process.wait(DEADLINE_S)
     took_s = time.monotonic() - asked_s
-    told = "\n".join(process.last_lines())
-    assert code == 0, f"{process.service} ended with {code}:\n{told}"
-    assert took_s < 1.0, f"{process.service} took {took_s:.2f} s:\n{told}"
-    assert "Traceback" not in told
+    reported = "\n".join(process.last_lines())
+    assert code == 0, f"{process.service} ended with {code}:\n{reported}"
+    assert took_s < 1.0, f"{process.service} took {took_s:.2f} s:\n{reported}"
+    assert "Traceback" not in reported
 
 
 @pytest.mark.parametrize("how", ENDS)

@@ -85,8 +85,8 @@ def test_a_recorded_device_log_replays_as_the_device(scene: Scene, recordings: P
     )  # fmt: skip
 
     def last() -> bool:
-        told = [r.body for r in scene.watcher.motions if r.envelope.source.instance == "replay"]
-        return any(m.dead_man and m.position[0] > 0.17 for m in told)
+        reported = [r.body for r in scene.watcher.motions if r.envelope.source.instance == "replay"]
+        return any(m.dead_man and m.position[0] > 0.17 for m in reported)
 
     stack.until(last)
     held = [

@@ -38,11 +38,11 @@ def flags_of(service: str, model: Path | str) -> list[str]:
 def refuses(*command: str, saying: str) -> None:
     """Run a process to its end: exit code 2, and one line that says so."""
     done = run_to_end(command)
-    told = [line for line in done.stderr.splitlines() if not line.startswith(("{", "pybullet"))]
+    reported = [line for line in done.stderr.splitlines() if not line.startswith(("{", "pybullet"))]
     assert done.returncode == 2, f"exit code {done.returncode}: {done.stderr}"
     assert "Traceback" not in done.stdout + done.stderr
-    assert len(told) == 1, told
-    assert saying in told[0]
+    assert len(reported) == 1, reported
+    assert saying in reported[0]
 
 
 def truncated(path: Path) -> None:

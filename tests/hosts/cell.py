@@ -143,17 +143,17 @@ class SpreadCell:
 
     def last_seen(self) -> str:
         """Tell what robot and operator said last, and how long ago."""
-        told = [f"{len(self.fresh_states)} states, {len(self.beliefs)} beliefs"]
+        reported = [f"{len(self.fresh_states)} states, {len(self.beliefs)} beliefs"]
         if self.states:
             state, ago_s = self.states[-1].body, _ago_s(self.states[-1])
-            told.append(
+            reported.append(
                 f"robot {ago_s:.1f} s ago: stop {state.stop}, contacts {state.contacts}, "
                 f"at {state.tool_position}"
             )
         if self.motions:
             motion, ago_s = self.motions[-1].body, _ago_s(self.motions[-1])
-            told.append(f"hand {ago_s:.1f} s ago: dead_man {motion.dead_man}")
-        return "; ".join(told)
+            reported.append(f"hand {ago_s:.1f} s ago: dead_man {motion.dead_man}")
+        return "; ".join(reported)
 
     def believes(self) -> bool:
         """Whether beliefs reach the robot's host."""

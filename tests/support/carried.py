@@ -61,5 +61,5 @@ def serious(*demonstrations: Demonstration) -> list[str]:
     return [finding.text for finding in findings(TASK, demonstrations) if finding.serious]
 
 
-def told(*demonstrations: Demonstration) -> list[str]:
+def texts(*demonstrations: Demonstration) -> list[str]:
     return [finding.text for finding in findings(TASK, demonstrations)]

@@ -40,17 +40,19 @@ class Cell:
     def __init__(self, stack: LocalStack, bus: Bus, served: Served) -> None:
         self.stack, self.bus, self._served = stack, bus, served
         self.folder = stack.folder
-        self.told: list[str] = []
+        self.reported: list[str] = []
 
     def deploy(self, file: Path) -> None:
         self._raised(lambda: deploy(self.bus, Control(self.folder), self.folder, file, **self._how))
 
     def back(self) -> None:
-        self._raised(lambda: back(self.bus, Control(self.folder), self.folder, self.told.append))
+        self._raised(
+            lambda: back(self.bus, Control(self.folder), self.folder, self.reported.append)
+        )
 
     @property
     def _how(self) -> dict[str, Any]:
-        return {"watch_s": 0.0, "tell": self.told.append}
+        return {"watch_s": 0.0, "tell": self.reported.append}
 
     def _raised(self, act: Callable[[], Any]) -> None:
         def aside() -> BaseException | None:

@@ -207,7 +207,7 @@ def message_of(step: MotionStep) -> Step:
     return Step(**step._asdict())
 
 
-def told(belief: Belief) -> dict[str, Any]:
+def reported(belief: Belief) -> dict[str, Any]:
     """Return what a belief says in numbers."""
     return {
         "probabilities": belief.probabilities,

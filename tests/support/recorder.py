@@ -30,8 +30,8 @@ class Bench:
         self.stack, self.folder = stack, folder
         self.hand = Hand(stack.open_bus("input_device", "hand"))
         self.bus = stack.open_bus("recorder", "here")
-        told = RecorderSettings(folder=folder, flush_s=0.05, free_mb=0.0, **settings)
-        self.service = Recorder(told, self.bus, LOG)
+        reported = RecorderSettings(folder=folder, flush_s=0.05, free_mb=0.0, **settings)
+        self.service = Recorder(reported, self.bus, LOG)
         self.service.start()
         stack.until(lambda: self.hand._motions.matching)
 

@@ -73,7 +73,7 @@ class Stack:
         self.close()
 
     def close(self) -> None:
-        """Close every bus and kill every process; all has been told that the tests want to hear."""
+        """Close every bus and kill every process; all has been said that the tests want to hear."""
         self._contexts.close()
         for process in self.processes:
             process.send(signal.SIGKILL)

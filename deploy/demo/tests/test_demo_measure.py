@@ -43,7 +43,7 @@ def test_each_step_is_of_the_state_most_of_it_was_made_in(measured: Measured) ->
 
 
 @pytest.mark.parametrize("late_ns", [0, 4_000_000, 9_000_000])
-def test_samples_are_told_apart_however_late_they_are(
+def test_samples_are_distinguished_however_late_they_are(
     recorded: Record, performance: Demonstration, model: Model, late_ns: int
 ) -> None:
     measured = measure(recorded(late_ns), performance, model, RATE_HZ)
@@ -182,7 +182,7 @@ def test_operator_who_lets_go_and_presses_again_shifts_no_sample_and_makes_no_pa
 
 
 @pytest.mark.parametrize("hung", [0, 30], ids=["samples lost", "recording waited"])
-def test_gap_in_the_samples_is_told_from_a_hang_by_where_the_hand_is_then(
+def test_gap_in_the_samples_is_distinguished_from_a_hang_by_where_the_hand_is_then(
     recorded: Record, performance: Demonstration, model: Model, hung: int
 ) -> None:
     recording = recorded()

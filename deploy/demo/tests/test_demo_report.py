@@ -48,7 +48,7 @@ def test_every_figure_is_explained(summary: Summary) -> None:
     assert all(meaning for meaning in explained.values())
 
 
-def test_goals_are_told_apart_from_what_was_reached(summary: Summary) -> None:
+def test_goals_are_distinguished_from_what_was_reached(summary: Summary) -> None:
     good = {line.figure: line.reached for line in lines(summary)}
     assert good["Steps without a belief"] is True
     assert good["Hand to mean demonstration"] is None

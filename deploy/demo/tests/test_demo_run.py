@@ -26,7 +26,7 @@ FEW_S = 6.0
 
 
 @pytest.mark.parametrize("held_out", [(), (1,), (1, 1), (0, 5), (1, 8), (1, 2, 3)])
-def test_numbers_that_cannot_be_held_out_are_told(
+def test_numbers_that_cannot_be_held_out_are_reported(
     tmp_path: Path, held_out: tuple[int, ...]
 ) -> None:
     with pytest.raises(UserError, match="two different numbers from 1 to 7"):
@@ -49,7 +49,7 @@ def test_mistake_on_the_command_line_is_exit_code_2(
     assert f"--held-out {numbers}: " in capsys.readouterr().err
 
 
-def test_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_folder_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(UserError, match="cannot be written"):
         demo.run(output=tmp_path / "file" / "report", seed=1, held_out=(1, 5))

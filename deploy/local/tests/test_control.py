@@ -65,7 +65,7 @@ def test_what_cannot_be_done_is_answered_and_the_server_goes_on(
     served(stack, command)
 
 
-def test_without_an_up_in_the_folder_the_asker_is_told(tmp_path: Path) -> None:
+def test_without_an_up_in_the_folder_the_asker_gets_an_error(tmp_path: Path) -> None:
     with pytest.raises(ControlError, match="no `hmcs up` works in"):
         Control(tmp_path).owns("a-1")
 

@@ -48,7 +48,7 @@ def test_a_newcomer_the_fixture_refuses_goes_again_however_often(
         with pytest.raises(SwapError, match="not now"):
             cell.deploy(files["mine"])
         assert cell.running == []
-        assert cell.told[-1].endswith("is stopped again")
+        assert cell.reported[-1].endswith("is stopped again")
         assert read_history(cell.folder) == History()
 
 

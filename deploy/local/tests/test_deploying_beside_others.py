@@ -29,7 +29,7 @@ def test_what_a_killed_deploy_has_left_is_stopped_by_the_next_one(
     write_history(cell.folder, History(shadow=shadow))
     cell.deploy(files["mine"])
     assert (fixture.active, cell.running) == ("mine", ["recognizer-2"])
-    assert cell.told[0].startswith(f"{left} stopped")
+    assert cell.reported[0].startswith(f"{left} stopped")
 
 
 def test_what_runs_under_a_name_of_an_earlier_up_is_nobodys_to_stop(

@@ -71,7 +71,7 @@ def test_what_a_job_makes_is_waited_for() -> None:
     assert ROUTER not in waiting
 
 
-def test_a_compose_file_that_is_none_is_told(tmp_path, capsys) -> None:
+def test_a_compose_file_that_is_none_is_reported(tmp_path, capsys) -> None:
     file = tmp_path / "compose.yaml"
     file.write_text("services: 3\n")
     assert main(["", str(file), str(tmp_path / "out.yaml")]) == 2

@@ -102,7 +102,7 @@ def test_a_mistake_ends_with_code_2_and_nothing_is_written(
     assert not labels_beside(take).exists()
 
 
-def test_a_file_that_is_no_recording_is_told(hmcs: Run, tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_reported(hmcs: Run, tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_text("nothing of the kind")
     code, _, error = hmcs("label", tmp_path / "no.mcap")
     assert code == 2
@@ -140,7 +140,7 @@ def test_an_error_that_quotes_a_file_is_text(hmcs: Run, tmp_path: Path) -> None:
     assert err.replace("\n", "").isprintable()
 
 
-def test_labels_of_another_recording_are_told_and_kept_aside(hmcs: Run, take: Path) -> None:
+def test_labels_of_another_recording_are_reported_and_kept_aside(hmcs: Run, take: Path) -> None:
     assert hmcs("label", take, "--set", "0-1=old")[0] == 0
     take.unlink()
     Maker(take.parent).write(list(hand_of(("carry", "lift"), 100)))
@@ -156,14 +156,14 @@ def test_labels_of_another_recording_are_told_and_kept_aside(hmcs: Run, take: Pa
     assert states(take)[0] == "lift"
 
 
-def test_labels_in_milliseconds_are_told_as_such(hmcs: Run, take: Path) -> None:
+def test_labels_in_milliseconds_are_reported_as_such(hmcs: Run, take: Path) -> None:
     labels_beside(take).write_text("begin_s,end_s,state\n0,1000,lift\n1000,2000,carry\n")
     code, _, error = hmcs("label", take)
     assert code == 2
     assert "read like milliseconds: divide them by 1000" in error
 
 
-def test_a_label_beyond_the_end_is_told(hmcs: Run, take: Path) -> None:
+def test_a_label_beyond_the_end_is_reported(hmcs: Run, take: Path) -> None:
     labels_beside(take).write_text("begin_s,end_s,state\n0,2.9,lift\n")
     code, out, _ = hmcs("label", take)
     assert code == 0

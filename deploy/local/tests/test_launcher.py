@@ -50,45 +50,45 @@ def launch(
         stack = LocalStack(path, services=["a"], folder=tmp_path)
         stacks.append(stack)
         stack.start_all()
-        told, clock = Told(), Clock()
-        return stack, Launcher(stack, told, clock), told, clock
+        reported, clock = Told(), Clock()
+        return stack, Launcher(stack, reported, clock), reported, clock
 
     yield start
     for stack in stacks:
         stack.stop_all()
 
 
-def test_an_unexpected_end_is_told_in_one_line_with_exit_code_and_last_words(
+def test_an_unexpected_end_is_reported_in_one_line_with_exit_code_and_last_words(
     launch: Callable[..., Any], service: Describe, eventually: Eventually
 ) -> None:
-    stack, launcher, told, _ = launch(service(FAIL.format(code=3)))
+    stack, launcher, reported, _ = launch(service(FAIL.format(code=3)))
     eventually(lambda: not stack.processes["a-1"].running)
     launcher.look()
     launcher.look()
-    assert told == [
+    assert reported == [
         "a-1: a",
         "a-1: the cause",
         "a-1 ended (exit code 3), not started again; its last words: the cause",
     ]
 
 
-def test_a_kill_from_outside_is_told_by_its_signal(
+def test_a_kill_from_outside_is_reported_by_its_signal(
     launch: Callable[..., Any], service: Describe
 ) -> None:
-    stack, launcher, told, _ = launch(service())
+    stack, launcher, reported, _ = launch(service())
     stack.processes["a-1"].kill()
     launcher.look()
-    assert told.having("a-1 ended (killed by SIGKILL)")
+    assert reported.having("a-1 ended (killed by SIGKILL)")
 
 
 def test_an_end_that_was_asked_for_is_no_failure(
     launch: Callable[..., Any], service: Describe
 ) -> None:
-    stack, launcher, told, _ = launch(service(restart="always"))
+    stack, launcher, reported, _ = launch(service(restart="always"))
     stack.kill("a", signal_number=signal.SIGTERM)
     launcher.look()
-    assert told.having("a-1 stopped (killed by SIGTERM)")
-    assert not told.having("again")
+    assert reported.having("a-1 stopped (killed by SIGTERM)")
+    assert not reported.having("again")
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_it_is_started_again_as_compose_says_but_not_after_a_mistake_of_the_user
     code: int,
     again: bool,
 ) -> None:
-    stack, launcher, told, clock = launch(service(FAIL.format(code=code), restart=restart))
+    stack, launcher, reported, clock = launch(service(FAIL.format(code=code), restart=restart))
     first = stack.processes["a-1"]
     eventually(lambda: not first.running)
     launcher.look()
@@ -119,13 +119,13 @@ def test_it_is_started_again_as_compose_says_but_not_after_a_mistake_of_the_user
     clock.now_s += 0.2
     launcher.look()
     assert (stack.processes["a-1"] is not first) == again
-    assert bool(told.having("a-1 started again")) == again
+    assert bool(reported.having("a-1 started again")) == again
 
 
 def test_restarts_become_rarer_while_they_fail(
     launch: Callable[..., Any], service: Describe, eventually: Eventually
 ) -> None:
-    stack, launcher, told, clock = launch(service(FAIL.format(code=1), restart="on-failure"))
+    stack, launcher, reported, clock = launch(service(FAIL.format(code=1), restart="on-failure"))
     for _ in range(4):
         process = stack.processes["a-1"]
         process.started_s = clock.now_s
@@ -133,7 +133,9 @@ def test_restarts_become_rarer_while_they_fail(
         launcher.look()
         clock.now_s += 3
         launcher.look()
-    delays = [line.partition("again in ")[2].partition(" s")[0] for line in told.having("ended")]
+    delays = [
+        line.partition("again in ")[2].partition(" s")[0] for line in reported.having("ended")
+    ]
     assert delays == ["0.1", "0.2", "0.4", "0.8"]
 
 
@@ -166,7 +168,7 @@ def test_one_that_cannot_be_started_again_is_tried_until_it_can(
     eventually: Eventually,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    stack, launcher, told, clock = launch(service(FAIL.format(code=1), restart="on-failure"))
+    stack, launcher, reported, clock = launch(service(FAIL.format(code=1), restart="on-failure"))
     first = stack.processes["a-1"]
     ended_again(stack, launcher, clock, eventually)
     with monkeypatch.context() as patch:
@@ -179,7 +181,7 @@ def test_one_that_cannot_be_started_again_is_tried_until_it_can(
             launcher.look()
             clock.now_s += 20
     assert stack.processes["a-1"] is first
-    assert len(told.having("a-1 cannot be started")) == 5
+    assert len(reported.having("a-1 cannot be started")) == 5
     launcher.look()
     assert stack.processes["a-1"] is not first
 
@@ -202,11 +204,11 @@ def test_an_end_is_judged_though_another_process_had_the_same_pid(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(processes.StackProcess, "pid", 7)
-    stack, launcher, told, clock = launch(service(FAIL.format(code=1), restart="always"))
+    stack, launcher, reported, clock = launch(service(FAIL.format(code=1), restart="always"))
     for _ in range(3):
         ended_again(stack, launcher, clock, eventually)
         launcher.look()
-    assert len(told.having("a-1 ended")) == 3
+    assert len(reported.having("a-1 ended")) == 3
 
 
 def test_what_goes_wrong_in_judging_one_process_is_said_once_and_made_good(
@@ -215,7 +217,7 @@ def test_what_goes_wrong_in_judging_one_process_is_said_once_and_made_good(
     eventually: Eventually,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    stack, launcher, told, _clock = launch(service(FAIL.format(code=1), restart="always"))
+    stack, launcher, reported, _clock = launch(service(FAIL.format(code=1), restart="always"))
     process = stack.processes["a-1"]
     eventually(lambda: not process.running)
     with monkeypatch.context() as patch:
@@ -226,15 +228,15 @@ def test_what_goes_wrong_in_judging_one_process_is_said_once_and_made_good(
         patch.setattr(process, "last_lines", fail)
         for _ in range(3):
             launcher.look()
-    assert len(told.having("a-1: looking after it failed: StackError: cannot be judged")) == 1
+    assert len(reported.having("a-1: looking after it failed: StackError: cannot be judged")) == 1
     launcher.look()
-    assert told.having("a-1 ended (exit code 1), starting again")
+    assert reported.having("a-1 ended (exit code 1), starting again")
 
 
 @pytest.mark.parametrize(
     "error", [OSError(28, "No space left"), UnicodeEncodeError("", "", 0, 1, "")]
 )
-def test_a_stack_goes_on_where_nobody_can_be_told(
+def test_a_stack_goes_on_where_nobody_can_be_notified(
     launch: Callable[..., Any], service: Describe, eventually: Eventually, error: Exception
 ) -> None:
     stack, _, _, clock = launch(service(FAIL.format(code=1), restart="always"))
@@ -252,11 +254,11 @@ def test_a_stack_goes_on_where_nobody_can_be_told(
 def test_a_log_that_was_removed_ends_nothing(
     launch: Callable[..., Any], service: Describe, eventually: Eventually
 ) -> None:
-    stack, launcher, told, clock = launch(service(FAIL.format(code=1), restart="always"))
+    stack, launcher, reported, clock = launch(service(FAIL.format(code=1), restart="always"))
     first = stack.processes["a-1"]
     first.log_path.unlink()
     ended_again(stack, launcher, clock, eventually)
-    assert told.having("a-1 ended (exit code 1), starting again")
+    assert reported.having("a-1 ended (exit code 1), starting again")
     launcher.look()
     assert stack.processes["a-1"] is not first
 
@@ -269,10 +271,10 @@ def test_of_a_flood_of_lines_the_end_is_shown_and_what_is_left_out_is_said(
     launch: Callable[..., Any], service: Describe, eventually: Eventually, text: str
 ) -> None:
     times = 3 * processes.SHOWN_AT_ONCE_BYTES
-    stack, launcher, told, _ = launch(service(FLOODS.format(text=text, times=times)))
+    stack, launcher, reported, _ = launch(service(FLOODS.format(text=text, times=times)))
     eventually(lambda: not stack.processes["a-1"].running)
     launcher.look()
-    shown = told.having("a-1: ")
+    shown = reported.having("a-1: ")
     assert "bytes are left out here, see" in shown[0]
     assert len("".join(shown)) < 4 * processes.SHOWN_AT_ONCE_BYTES
     assert shown[-1].endswith("the end") or len(text) == 1
@@ -283,13 +285,13 @@ def test_a_line_that_does_not_end_is_shown_in_pieces(
 ) -> None:
     size = processes.SHOWN_AT_ONCE_BYTES
     script = f"import time; print('x' * {size}, end='', flush=True); time.sleep(600)"
-    stack, launcher, told, _ = launch(service(script))
+    stack, launcher, reported, _ = launch(service(script))
     process = stack.processes["a-1"]
     eventually(lambda: process.log_path.stat().st_size == size)
     launcher.look()
-    assert told.having("xxx")
+    assert reported.having("xxx")
     launcher.look()
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_a_log_that_grows_without_end_is_begun_anew(
@@ -302,30 +304,30 @@ def test_a_log_that_grows_without_end_is_begun_anew(
     script = (
         "import time\nfor k in range(10**9): print(f'line {k:9}', flush=True); time.sleep(1e-4)"
     )
-    stack, launcher, told, _ = launch(service(script))
+    stack, launcher, reported, _ = launch(service(script))
     log = stack.processes["a-1"].log_path
     older = log.with_name(f"{log.name}.1")
 
     def look_twice() -> bool:
         launcher.look()
-        return len(told.having("its log is begun anew")) >= 2
+        return len(reported.having("its log is begun anew")) >= 2
 
     eventually(look_twice)
     assert older.stat().st_size > 10_000
     assert log.stat().st_size < older.stat().st_size + 10_000
-    numbers = [int(line.rpartition(" ")[2]) for line in told.having("a-1: line")]
+    numbers = [int(line.rpartition(" ")[2]) for line in reported.having("a-1: line")]
     assert numbers == sorted(set(numbers))
     count = len(numbers)
-    eventually(lambda: launcher.look() or len(told.having("a-1: line")) > count)
+    eventually(lambda: launcher.look() or len(reported.having("a-1: line")) > count)
 
 
 def test_a_real_time_signal_has_a_number_alone(
     launch: Callable[..., Any], service: Describe, eventually: Eventually
 ) -> None:
-    stack, launcher, told, _ = launch(service("import os; os.kill(os.getpid(), 40)"))
+    stack, launcher, reported, _ = launch(service("import os; os.kill(os.getpid(), 40)"))
     eventually(lambda: not stack.processes["a-1"].running)
     launcher.look()
-    assert told.having("a-1 ended (killed by signal 40)")
+    assert reported.having("a-1 ended (killed by signal 40)")
 
 
 @pytest.mark.parametrize(

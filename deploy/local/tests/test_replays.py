@@ -34,12 +34,12 @@ CUTS = 20
 
 def renamed(task: Task, names: dict[str, str]) -> Task:
     """The same task with other names of its states."""
-    told = task.model_dump(mode="json")
-    told["start"] = [names.get(name, name) for name in told["start"]]
-    for state in told["states"]:
+    reported = task.model_dump(mode="json")
+    reported["start"] = [names.get(name, name) for name in reported["start"]]
+    for state in reported["states"]:
         state["name"] = names.get(state["name"], state["name"])
         state["next"] = [names.get(name, name) for name in state["next"]]
-    return Task.model_validate_json(json.dumps(told))
+    return Task.model_validate_json(json.dumps(reported))
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def take(
     return write_cell(tmp_path_factory.mktemp("takes"), said, attachments=kept)
 
 
-def test_the_same_model_is_told_to_have_believed_the_same(hmcs: Run, take: Path) -> None:
+def test_the_same_model_is_found_to_have_believed_the_same(hmcs: Run, take: Path) -> None:
     ended = hmcs("replay", str(take))
     assert ended.returncode == 0
     assert "same belief, bit by bit" in ended.stdout
@@ -87,14 +87,16 @@ def test_the_same_model_is_told_to_have_believed_the_same(hmcs: Run, take: Path)
 def test_every_figure_of_the_json_line_stands_in_the_help(
     hmcs: Run, take: Path, models: dict[str, Path]
 ) -> None:
-    told = json.loads(hmcs("replay", str(take), "--json", "--model", str(models["other"])).stdout)
+    reported = json.loads(
+        hmcs("replay", str(take), "--json", "--model", str(models["other"])).stdout
+    )
     explained = str(replay_command.__doc__)
-    assert told["recorded_model"] == "lesson"
-    assert told["same_bits"] == 0 < told["compared"]
-    assert told["fixture_guides_both"] > 0.1
-    for name in set(told) - {"model", "model_hash", "recorded_model"}:
+    assert reported["recorded_model"] == "lesson"
+    assert reported["same_bits"] == 0 < reported["compared"]
+    assert reported["fixture_guides_both"] > 0.1
+    for name in set(reported) - {"model", "model_hash", "recorded_model"}:
         assert f"`{name}`" in explained or f"`{name.removeprefix('fixture')}`" in explained, name
-        assert not isinstance(told[name], dict)
+        assert not isinstance(reported[name], dict)
 
 
 def test_steps_and_picture_are_written(hmcs: Run, take: Path, tmp_path: Path) -> None:
@@ -120,7 +122,7 @@ def test_steps_and_picture_are_written(hmcs: Run, take: Path, tmp_path: Path) ->
         (["--model", "none.hmcs"], "none.hmcs"),
     ],
 )
-def test_what_cannot_be_written_or_read_is_told_with_exit_code_2(
+def test_what_cannot_be_written_or_read_is_reported_with_exit_code_2(
     hmcs: Run, take: Path, tmp_path: Path, words: list[str], says: str
 ) -> None:
     ended = hmcs("replay", str(take), *words)
@@ -129,7 +131,7 @@ def test_what_cannot_be_written_or_read_is_told_with_exit_code_2(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_a_file_is_told(hmcs: Run, take: Path, tmp_path: Path) -> None:
+def test_a_folder_that_is_a_file_is_reported(hmcs: Run, take: Path, tmp_path: Path) -> None:
     (tmp_path / "tables").write_text("mine")
     ended = hmcs("export", str(take), "--to", "tables")
     assert ended.returncode == 2
@@ -137,7 +139,7 @@ def test_a_folder_that_is_a_file_is_told(hmcs: Run, take: Path, tmp_path: Path) 
     assert (tmp_path / "tables").read_text() == "mine"
 
 
-def test_a_model_of_another_task_is_refused_and_of_a_changed_one_told(
+def test_a_model_of_another_task_is_refused_and_of_a_changed_one_reported(
     hmcs: Run, take: Path, models: dict[str, Path], tmp_path: Path
 ) -> None:
     ended = hmcs("replay", str(take), "--model", str(models["foreign"]), "--out", "steps.csv")
@@ -150,7 +152,7 @@ def test_a_model_of_another_task_is_refused_and_of_a_changed_one_told(
     assert "name states that task 'lesson' of model 'changed' has not: lift" in ended.stdout
 
 
-def test_labels_of_another_task_are_told(
+def test_labels_of_another_task_are_reported(
     hmcs: Run, said: list[Logged], models: dict[str, Path], tmp_path: Path
 ) -> None:
     step = next(each for each in said if each.is_of(Step))
@@ -177,7 +179,7 @@ def test_a_recording_without_steps_can_be_looked_at_and_not_replayed(
     assert not (tmp_path / "steps.csv").exists()
 
 
-def test_a_recording_with_gaps_is_replayed_and_the_gaps_are_told(
+def test_a_recording_with_gaps_is_replayed_and_the_gaps_are_reported(
     hmcs: Run, said: list[Logged], models: dict[str, Path], tmp_path: Path
 ) -> None:
     begin_ns = said[0].log_ns + 1_500_000_000
@@ -193,7 +195,7 @@ def test_a_recording_with_gaps_is_replayed_and_the_gaps_are_told(
 
 
 @pytest.mark.parametrize("of_another_version", [Step, FixtureState])
-def test_a_recording_of_another_version_of_the_contract_is_told(
+def test_a_recording_of_another_version_of_the_contract_is_reported(
     hmcs: Run,
     said: list[Logged],
     models: dict[str, Path],
@@ -228,7 +230,7 @@ def test_a_recording_of_another_version_of_the_contract_is_told(
     assert not (tmp_path / "steps.csv").exists()
 
 
-def test_a_recording_cut_at_any_byte_is_told_and_leaves_nothing_half_written(
+def test_a_recording_cut_at_any_byte_is_reported_and_leaves_nothing_half_written(
     hmcs: Run, take: Path, models: dict[str, Path], tmp_path: Path
 ) -> None:
     data, codes = take.read_bytes(), set()
@@ -296,7 +298,7 @@ def test_words_of_a_recording_are_shown_and_never_obeyed(
     assert all("\x1b" not in file.name for file in (tmp_path / "tables").iterdir())
 
 
-def test_damage_in_the_middle_is_told_with_its_times_and_the_rest_is_used(
+def test_damage_in_the_middle_is_reported_with_its_times_and_the_rest_is_used(
     hmcs: Run, take: Path, tmp_path: Path
 ) -> None:
     begin, end = chunks_of(take)[1]
@@ -325,5 +327,7 @@ def test_steps_believed_without_all_evidence_are_counted_apart(
     assert ended.returncode == 0
     lost = steps // 3
     assert f"{steps} steps, {lost} of them believed without all evidence live" in ended.stdout
-    told = json.loads(hmcs("replay", str(take), "--model", str(models["lesson"]), "--json").stdout)
-    assert (told["degraded"], told["compared"]) == (lost, steps - lost)
+    reported = json.loads(
+        hmcs("replay", str(take), "--model", str(models["lesson"]), "--json").stdout
+    )
+    assert (reported["degraded"], reported["compared"]) == (lost, steps - lost)

@@ -171,7 +171,7 @@ def test_a_one_shot_is_over_before_others_start(
     assert waits
 
 
-def test_a_failing_one_shot_is_told_with_its_last_words_and_nothing_is_left(
+def test_a_failing_one_shot_is_reported_with_its_last_words_and_nothing_is_left(
     write_compose: WriteCompose, service: Describe, tmp_path: Path, is_gone: IsGone
 ) -> None:
     needs = {"shot": {"condition": "service_completed_successfully"}, "a": {"condition": "x"}}
@@ -263,7 +263,7 @@ def test_a_killed_instance_is_replaced_under_a_new_name_or_started_again_under_i
             stack.kill("a", 3)
 
 
-def test_a_program_that_is_not_there_is_told(
+def test_a_program_that_is_not_there_is_reported(
     write_compose: WriteCompose, service: Describe, tmp_path: Path
 ) -> None:
     path = write_compose(a=service())
@@ -274,7 +274,7 @@ def test_a_program_that_is_not_there_is_told(
         stack.start("a", command=["no-such-program"])
 
 
-def test_a_taken_router_port_is_told(
+def test_a_taken_router_port_is_reported(
     write_compose: WriteCompose, service: Describe, tmp_path: Path
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:

@@ -112,8 +112,8 @@ def test_that_nobody_runs_the_active_model_is_said_and_is_not_well(
     bus.announce(bus.keys.member("mine", "gesteme_classifier", "c"))
     eventually(lambda: observe(bus).speakers)
     well, table = shown(bus, width)
-    told = " ".join(table.split())
-    assert "follows mine, but nobody runs it (models that are run: other)" in told
+    reported = " ".join(table.split())
+    assert "follows mine, but nobody runs it (models that are run: other)" in reported
     assert not well
 
 

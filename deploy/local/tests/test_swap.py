@@ -53,13 +53,13 @@ def running(stack: LocalStack) -> list[str]:
 def test_a_classifier_goes_once_its_successor_is_ready(
     stack: LocalStack, bus: Bus, served: Served
 ) -> None:
-    told: list[str] = []
+    reported: list[str] = []
     control = Control(stack.folder)
-    newcomer = served(stack, lambda: replace_classifier(bus, control, OLD, tell=told.append))
+    newcomer = served(stack, lambda: replace_classifier(bus, control, OLD, tell=reported.append))
     assert newcomer == "gesteme-classifier-2"
     assert running(stack) == [newcomer]
     assert stack.processes[OLD].exit_code == 0
-    assert told == [
+    assert reported == [
         f"{newcomer} started; {OLD} goes on until it is ready",
         f"{newcomer} has replayed and is ready",
         f"{OLD} stopped with exit code 0",
@@ -169,17 +169,17 @@ def test_a_newcomer_goes_again_whatever_keeps_it_from_taking_over(
         raise how("at this very moment")
 
     monkeypatch.setattr(swap, "until_ready", fail)
-    told: list[str] = []
+    reported: list[str] = []
 
     def replace() -> str:
         try:
-            return replace_classifier(bus, Control(stack.folder), OLD, tell=told.append)
+            return replace_classifier(bus, Control(stack.folder), OLD, tell=reported.append)
         except BaseException as error:  # of a thread, none gets through
             return type(error).__name__
 
     assert served(stack, replace) == how.__name__
     assert running(stack) == [OLD]
-    assert told[-1] == "gesteme-classifier-2 is stopped again"
+    assert reported[-1] == "gesteme-classifier-2 is stopped again"
 
 
 def test_an_interrupt_while_a_process_is_being_started_stops_it_again(
@@ -201,7 +201,7 @@ def test_an_interrupt_while_a_process_is_being_started_stops_it_again(
     assert stopped == ["a-7"]
 
 
-def test_what_cannot_be_stopped_again_is_told(stack: LocalStack) -> None:
+def test_what_cannot_be_stopped_again_is_reported(stack: LocalStack) -> None:
     class Deaf(Control):
         def start(self, service: str, command: object = None) -> str:
             return f"{service}-7"

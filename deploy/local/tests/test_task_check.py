@@ -72,7 +72,7 @@ def test_findings_about_demonstrations_are_printed_and_refuse_nothing(folder: Pa
     assert done.stdout.endswith("2 demonstrations agree, apart from the findings above\n")
 
 
-def test_both_refuse_what_no_hand_made_and_training_does_it_if_told_to(folder: Path) -> None:
+def test_both_refuse_what_no_hand_made_and_training_does_it_if_asked_to(folder: Path) -> None:
     file = folder / "take-1.csv"
     lines = file.read_text().splitlines()
     lines[150] = lines[150].split(",")[0] + ",0,0,0,take"

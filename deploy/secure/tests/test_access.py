@@ -257,7 +257,7 @@ def test_an_expired_certificate_gets_no_session(cell) -> None:
         cell.open_with(cell.authority, holder)
 
 
-def test_a_certificate_the_router_was_never_told_of_says_and_hears_nothing(cell) -> None:
+def test_a_certificate_the_router_was_never_given_says_and_hears_nothing(cell) -> None:
     heard, stranger_heard = Heard(), Heard()
     keep = cell.open("recorder").declare_subscriber("hmcs/@v1/closed/**", heard)
     unknown = issue(cell.authority, Identity("closed", "fixture_controller", "new"), utc_now())

@@ -94,7 +94,7 @@ def test_what_was_issued_is_found_again_with_its_expiry(authority) -> None:
     assert found[ROUTER].hosts == router.hosts
 
 
-def test_a_certificate_of_another_cell_among_ones_own_is_told(authority, tmp_path) -> None:
+def test_a_certificate_of_another_cell_among_ones_own_is_reported(authority, tmp_path) -> None:
     made = authority()
     other = create_authority(tmp_path / "other", "other", utc_now())
     stranger = issue(other, Identity("other", "robot"), utc_now())
@@ -105,7 +105,7 @@ def test_a_certificate_of_another_cell_among_ones_own_is_told(authority, tmp_pat
 
 
 @pytest.mark.parametrize("content", [b"", b"no certificate", b"\x00" * 1000])
-def test_a_file_that_is_no_certificate_is_told_with_what_to_do(authority, content) -> None:
+def test_a_file_that_is_no_certificate_is_reported_with_what_to_do(authority, content) -> None:
     made = authority()
     made.certificate.write_bytes(content)
     with pytest.raises(AuthorityError, match="no certificate: make one"):
@@ -130,7 +130,7 @@ def test_a_host_that_is_no_name_is_refused(authority) -> None:
         issue(authority(), Identity("closed", ROUTER), utc_now(), hosts=["bär.example"])
 
 
-def test_a_router_without_a_certificate_is_told_how_to_get_one(authority, tmp_path) -> None:
+def test_a_router_without_a_certificate_is_refused_with_how_to_get_one(authority, tmp_path) -> None:
     with pytest.raises(AuthorityError, match="hmcs secure issue closed router"):
         write_router_file(authority(), tmp_path / "router.json5")
 

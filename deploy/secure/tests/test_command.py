@@ -38,9 +38,9 @@ def configured(file: Path) -> Any:
 
 
 def test_a_new_cell_has_a_certificate_for_every_role_and_a_router(call, tmp_path) -> None:
-    told = call("init", "lab").output
-    assert "Keep" in told
-    assert "ca.key" in told
+    reported = call("init", "lab").output
+    assert "Keep" in reported
+    assert "ca.key" in reported
     configuration = configured(tmp_path / "lab" / "router.json5")
     assert configuration["access_control"]["default_permission"] == "deny"
     assert "every certificate" not in call("check", "lab").output
@@ -53,7 +53,7 @@ def test_a_certificate_issued_later_is_known_to_the_routers_file(call, tmp_path)
     assert "lab/gesteme_classifier/gc-1" in (tmp_path / "lab" / "router.json5").read_text()
 
 
-def test_what_expires_soon_is_told_and_renewed(call, monkeypatch, tmp_path) -> None:
+def test_what_expires_soon_is_reported_and_renewed(call, monkeypatch, tmp_path) -> None:
     call("init", "lab")
     later = utc_now() + timedelta(days=350)
     monkeypatch.setattr(command, "utc_now", lambda: later)
@@ -85,7 +85,7 @@ def test_containers_get_a_router_named_as_theirs_and_keys_of_their_own(
     assert credentials["listen_private_key"] == "/secure/holders/router.key"
 
 
-def test_who_may_not_hand_keys_over_is_told_what_to_do(call, monkeypatch) -> None:
+def test_who_may_not_hand_keys_over_learns_what_to_do(call, monkeypatch) -> None:
     def refuses(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
@@ -95,13 +95,13 @@ def test_who_may_not_hand_keys_over_is_told_what_to_do(call, monkeypatch) -> Non
         call("containers", "lab")
 
 
-def test_a_key_that_others_may_read_is_told(call, tmp_path) -> None:
+def test_a_key_that_others_may_read_is_reported(call, tmp_path) -> None:
     call("init", "lab")
     (tmp_path / "lab" / "holders" / "robot.key").chmod(0o644)
     assert "others may read" in " ".join(call("check", "lab", fails=True).output.split())
 
 
-def test_mistakes_are_told(call) -> None:
+def test_mistakes_are_reported(call) -> None:
     with pytest.raises(AuthorityError, match="make one with `hmcs secure init`"):
         call("check", "lab")
     call("init", "lab")
@@ -109,7 +109,7 @@ def test_mistakes_are_told(call) -> None:
         call("issue", "lab", "roboter")
 
 
-def test_a_signed_model_is_told_from_one_that_was_changed(call, tmp_path) -> None:
+def test_a_signed_model_is_distinguished_from_one_that_was_changed(call, tmp_path) -> None:
     call("init", "lab")
     cell, model = tmp_path / "lab", tmp_path / "mine.hmcs"
     model.write_bytes(b"a model")

@@ -226,9 +226,9 @@ def test_wrong_tokens_of_an_address_cost_more_and_more_time_and_nobody_elses() -
     wrong, right = asking("/?token=wrong"), asking("/?token=a+secret%3B+of+8")
     tried = [door.judge(wrong, ELSEWHERE, now_s / 10) for now_s in range(80)]
     assert sum(verdict.status == 401 for verdict in tried) < 8
-    told = next(verdict for verdict in tried if verdict.status == 429)
-    assert re.search(r"wait \d+ s", told.reason)
-    assert any(header.startswith("Retry-After: ") for header in told.headers)
+    reported = next(verdict for verdict in tried if verdict.status == 429)
+    assert re.search(r"wait \d+ s", reported.reason)
+    assert any(header.startswith("Retry-After: ") for header in reported.headers)
     # Even the right one has to wait, else whoever tries would learn of it.
     assert door.judge(right, ELSEWHERE, 8.0).status == 429
     assert door.judge(right, HERE, 8.0).status == 303

@@ -122,13 +122,13 @@ def keep(seen: Seen, said: Any) -> Take | None:
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(st.lists(st.sampled_from(KINDS).flatmap(changed), min_size=1, max_size=6))
-def test_any_numbers_are_drawn(view: View, told: list[Any]) -> None:
+def test_any_numbers_are_drawn(view: View, reported: list[Any]) -> None:
     seen = Seen(())
     take = Take()
     with warnings.catch_warnings():
         # Numbers that are larger than what draws them can hold are drawn somewhere.
         warnings.simplefilter("ignore", RuntimeWarning)
-        for said in told:
+        for said in reported:
             take = keep(seen, said) or take
             seen.write_down(10.0)
         view._words_s = view._scene._trails_s = 0.0

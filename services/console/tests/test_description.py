@@ -39,7 +39,7 @@ def mesh(filename: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("urdf", "told"),
+    ("urdf", "reported"),
     [
         ("", "cannot be read as XML"),
         ("<robot>", "cannot be read as XML"),
@@ -71,8 +71,8 @@ def mesh(filename: str) -> str:
         (robot("x" * 4_000_001), "more than"),
     ],
 )
-def test_a_description_that_cannot_be_drawn_is_refused(urdf: str, told: str) -> None:
-    with pytest.raises(DescriptionError, match=told):
+def test_a_description_that_cannot_be_drawn_is_refused(urdf: str, reported: str) -> None:
+    with pytest.raises(DescriptionError, match=reported):
         tidy(urdf, {})
 
 
@@ -83,7 +83,7 @@ def test_entities_are_not_even_read() -> None:
 
 
 def test_of_a_description_only_what_is_seen_is_kept() -> None:
-    told = tidy(
+    reported = tidy(
         robot(
             '<gazebo><plugin filename="evil.so"/></gazebo>'
             '<link name="../../x"><inertial/><collision><geometry><mesh filename="/etc/passwd"/>'
@@ -95,8 +95,8 @@ def test_of_a_description_only_what_is_seen_is_kept() -> None:
         {},
     )
     for word in (b"evil", b"etc", b"dev", b"..", b"texture", b"collision"):
-        assert word not in told
-    visuals = ElementTree.fromstring(told).findall("link/visual")
+        assert word not in reported
+    visuals = ElementTree.fromstring(reported).findall("link/visual")
     assert [visual.find("geometry/sphere") is not None for visual in visuals] == [True]
 
 
@@ -104,10 +104,10 @@ def test_of_a_description_only_what_is_seen_is_kept() -> None:
 def test_any_text_is_tidied_or_refused(text: str) -> None:
     for urdf in (text, robot(text), robot(f'<link name="{text}"/>')):
         try:
-            told = tidy(urdf, {})
+            reported = tidy(urdf, {})
         except DescriptionError:
             continue
-        assert ElementTree.fromstring(told).tag == "robot"
+        assert ElementTree.fromstring(reported).tag == "robot"
 
 
 # --- files ----------------------------------------------------------------------------------------

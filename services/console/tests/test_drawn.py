@@ -77,7 +77,7 @@ def moving() -> yourdfpy.URDF:
         ("thumb", "revolute", 'xyz="0 0 1"', '<mimic joint="turn" multiplier="0.5" offset="0.2"/>'),
     ]
     links = "".join(f'<link name="l{number}"/>' for number in range(len(joints) + 1))
-    told = "".join(
+    reported = "".join(
         f'<joint name="{name}" type="{kind}">'
         f'<parent link="l{number}"/><child link="l{number + 1}"/>'
         f'<origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 {number}"/>{axis and f"<axis {axis}/>"}{mimic}'
@@ -86,7 +86,7 @@ def moving() -> yourdfpy.URDF:
     )
     return load_robot(
         RobotDescription(
-            robot="arm", urdf=f'<robot name="arm">{links}{told}</robot>', joints=(), files={}
+            robot="arm", urdf=f'<robot name="arm">{links}{reported}</robot>', joints=(), files={}
         )
     )
 
@@ -115,7 +115,7 @@ def test_a_robot_is_drawn_as_its_description_would_have_it_move() -> None:
     server.stop()
 
 
-def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None:
+def test_a_joint_that_is_not_reported_or_hardly_moved_stays_as_it_is_drawn() -> None:
     server = Server(LOG)
     robot = DrawnRobot(server, moving(), "/robot")
     robot.move({"turn": 0.5, "wheel": 1.0})
@@ -128,7 +128,7 @@ def test_a_joint_that_is_not_told_or_hardly_moved_stays_as_it_is_drawn() -> None
     server.stop()
 
 
-def test_joints_are_told_by_their_names() -> None:
+def test_joints_are_reported_by_their_names() -> None:
     robot_description = RobotDescription(robot="arm", urdf=URDF, joints=("j1", "j2"), files={})
     assert joints_of(robot_description, np.array([0.5, 0.7])) == {"j1": 0.5, "j2": 0.7}
 
@@ -223,7 +223,7 @@ def test_a_slow_painter_is_shown_less() -> None:
     painter.close()
 
 
-def test_a_failed_drawing_is_told_until_one_succeeds() -> None:
+def test_a_failed_drawing_is_reported_until_one_succeeds() -> None:
     drawn: list[int] = []
 
     def draw(number: int) -> None:

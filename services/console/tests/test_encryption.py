@@ -77,7 +77,7 @@ def test_connections_that_never_say_hello_are_bounded_with_a_certificate_too(
 
 
 @pytest.mark.parametrize(
-    ("certificate", "key", "told"),
+    ("certificate", "key", "reported"),
     [
         ("nowhere.pem", KEY, "No such file"),
         (CERTIFICATE, "nowhere.key", "No such file"),
@@ -86,8 +86,8 @@ def test_connections_that_never_say_hello_are_bounded_with_a_certificate_too(
         (Path(__file__), KEY, "give PEM files"),
     ],
 )
-def test_a_certificate_that_cannot_be_used_is_told(
-    certificate: Path | str, key: Path | str, told: str
+def test_a_certificate_that_cannot_be_used_is_reported(
+    certificate: Path | str, key: Path | str, reported: str
 ) -> None:
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=reported):
         encryption(Path(certificate), Path(key))

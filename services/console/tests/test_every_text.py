@@ -116,9 +116,9 @@ def set_to(name: str, of: Callable[[Any], Any] = lambda body: body) -> Keep:
 
 KEPT: Mapping[type[Message], Keep] = {
     Belief: keep_belief,
-    Evidence: lambda seen, told: seen.evident(ACTIVE, told),
-    FixtureState: lambda seen, told: seen.fixture_changed(10.0, told),
-    RobotState: lambda seen, told: seen.robot_moved(10.0, told),
+    Evidence: lambda seen, reported: seen.evident(ACTIVE, reported),
+    FixtureState: lambda seen, reported: seen.fixture_changed(10.0, reported),
+    RobotState: lambda seen, reported: seen.robot_moved(10.0, reported),
     TrainingProgress: keep_training,
     Health: keep_health,
     Done: keep_done,
@@ -238,15 +238,15 @@ HARMLESS = {
 
 def read(markdown: str) -> str:
     """What a person reads of markdown; fails where it holds more than words, lists and tables."""
-    told = []
+    reported = []
     for token in PARSER.parse(markdown):
         for part in [token, *(token.children or ())]:
             assert part.type in HARMLESS, (part.type, markdown)
             if part.type in ("text", "text_special"):
-                told.append(part.content)
+                reported.append(part.content)
             elif part.type in ("softbreak", "hardbreak", "paragraph_close"):
-                told.append("\n")
-    text = "".join(told)
+                reported.append("\n")
+    text = "".join(reported)
     for link in LINKS:
         assert not link.search(text), (link.pattern, markdown)
     return text.replace(JOINER, "")
@@ -260,16 +260,16 @@ def is_harmless(name: str, text: str) -> bool:
 
 def look_at(sent: Sent, what: str) -> str:
     """What a person reads of all that was sent, which is looked at text by text."""
-    told = []
+    reported = []
     for name, text in sent.texts:
         if name == "_markdown":
-            told.append(read(text))
+            reported.append(read(text))
             assert len(text) < 20_000, what
         else:
             assert is_harmless(name, text), (what, name, text)
             assert name != "content", (what, text)
-            told.append(text)
-    return "\n".join(told)
+            reported.append(text)
+    return "\n".join(reported)
 
 
 def fed(kind: type[Message], path: Path, text: str) -> Seen:
@@ -305,8 +305,8 @@ def test_every_text_of_a_message_is_shown_as_it_reads(
     for text in (*HOSTILE, LONG):
         seen = fed(kind, path, text)
         sent.draw(seen)
-        told = look_at(sent, f"{kind.__name__} {path} {text[:40]!r}")
+        reported = look_at(sent, f"{kind.__name__} {path} {text[:40]!r}")
         if (kind.__name__, path) in READ and text != LONG:
             # Blanks run together where words are laid out; an error quotes what it is about.
             wanted = (" ".join(said.split()) for said in (plain(text), repr(text)[1:-1]))
-            assert any(said in " ".join(told.split()) for said in wanted), (text, told)
+            assert any(said in " ".join(reported.split()) for said in wanted), (text, reported)

@@ -66,7 +66,7 @@ def test_there_is_nothing_but_the_page(make_door: MakeDoor) -> None:
         b"\xff\xfe",
     ],
 )
-def test_a_malformed_head_is_told_so_and_no_more(make_door: MakeDoor, head: bytes) -> None:
+def test_a_malformed_head_is_reported_and_no_more(make_door: MakeDoor, head: bytes) -> None:
     door = make_door()
     assert door.said(b"GET / HTTP/1.1\r\n" + head + b"\r\n\r\n").startswith(b"HTTP/1.1 400 ")
     assert door.lines == []
@@ -87,7 +87,7 @@ def test_what_a_page_says_and_hears_is_handed_through(make_door: MakeDoor, behin
     assert "user-agent" not in behind.requests[0].lower()
 
 
-def test_a_page_of_another_version_is_told_so(make_door: MakeDoor) -> None:
+def test_a_page_of_another_version_is_warned(make_door: MakeDoor) -> None:
     door = make_door()
     for protocols in ([Subprotocol("viser-v0.0.0")], None):
         with pytest.raises(InvalidStatus) as refused:
@@ -168,7 +168,7 @@ def test_so_many_connections_are_open_at_once_and_the_others_are_closed(
     assert door.get().status == 200
 
 
-def test_wrong_tokens_are_told_seldom_with_where_they_came_from_and_soon_have_to_wait(
+def test_wrong_tokens_are_reported_seldom_with_where_they_came_from_and_soon_have_to_wait(
     make_door: MakeDoor,
 ) -> None:
     door = make_door(token=TOKEN)
@@ -177,9 +177,9 @@ def test_wrong_tokens_are_told_seldom_with_where_they_came_from_and_soon_have_to
     assert sum(answer.status == 429 for answer in answers) > 30
     assert int(next(a for a in answers if a.status == 429).headers["Retry-After"]) >= 1
     assert 1 <= len(door.lines) < 10
-    told = vars(door.lines[0])
-    assert told["address"] == "127.0.0.1"
-    assert "wrong token" in told["reason"]
+    reported = vars(door.lines[0])
+    assert reported["address"] == "127.0.0.1"
+    assert "wrong token" in reported["reason"]
     assert not any(TOKEN in str(vars(line)) or "guess" in str(vars(line)) for line in door.lines)
 
 

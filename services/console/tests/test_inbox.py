@@ -95,7 +95,7 @@ def test_what_is_not_too_much_leads_to_what_all_of_it_would(history: list[Event]
 
 
 @given(history=histories)
-def test_the_last_position_is_always_told(history: list[Event]) -> None:
+def test_the_last_position_is_always_reported(history: list[Event]) -> None:
     kept = taken([Grabbed(1, 1.0, point(0)), *history, Moved(1, 1.0, point(123))])
     moves = [event for event in kept if isinstance(event, Moved) and event.client == 1]
     assert moves[-1].position[0] == 123

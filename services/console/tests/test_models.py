@@ -111,7 +111,7 @@ def test_whoever_tells_of_ever_new_models_has_no_file_read_more_often(
 @pytest.mark.parametrize(
     "path", ["/etc/passwd", "/m/a\x00.hmcs", "/m/a\n.hmcs", "", "/m/" + "x" * 5000 + ".hmcs", "/m"]
 )
-def test_a_path_that_is_told_and_is_none_of_a_model_file_is_not_looked_at(path: str) -> None:
+def test_a_path_that_is_reported_and_is_none_of_a_model_file_is_not_looked_at(path: str) -> None:
     models = Models((), (), LOG)
     models.look_in(path)
     assert not models._named_files

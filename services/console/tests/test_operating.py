@@ -31,24 +31,24 @@ def doing(*events: Event) -> Operating:
     return operating
 
 
-def test_a_grabbed_handle_is_told_as_released_where_it_is_and_then_as_held() -> None:
+def test_a_grabbed_handle_is_reported_as_released_where_it_is_and_then_as_held() -> None:
     outcome = after(Operating("desk"), Grabbed(3, 10.0, HERE))
-    (told,) = outcome.handles
-    assert (told.operator, told.dead_man) == ("desk-page-3", False)
-    assert_allclose(told.position, HERE)
+    (reported,) = outcome.handles
+    assert (reported.operator, reported.dead_man) == ("desk-page-3", False)
+    assert_allclose(reported.position, HERE)
     assert outcome.operating.handle(10.0) is None
     held = outcome.operating.handle(LATER_S)
     assert held is not None
     assert held.dead_man
 
 
-def test_a_moved_handle_is_told_where_it_is() -> None:
+def test_a_moved_handle_is_reported_where_it_is() -> None:
     held = doing(Grabbed(3, 10.0, HERE), Moved(3, 10.1, THERE)).handle(LATER_S)
     assert held is not None
     assert_allclose(held.position, THERE)
 
 
-def test_what_other_pages_drag_moves_nothing_and_they_are_told_who_operates() -> None:
+def test_what_other_pages_drag_moves_nothing_and_they_show_who_operates() -> None:
     operating = doing(Grabbed(3, 10.0, HERE))
     outcome = after(operating, Grabbed(4, 10.1, THERE))
     assert outcome.operating == operating
@@ -61,8 +61,8 @@ def test_what_other_pages_drag_moves_nothing_and_they_are_told_who_operates() ->
 def test_who_lets_go_or_goes_away_has_released_the_handle_at_once() -> None:
     for event in (LetGo(3), Gone(3)):
         outcome = after(doing(Grabbed(3, 10.0, HERE)), event)
-        (told,) = outcome.handles
-        assert (told.operator, told.dead_man) == ("desk-page-3", False)
+        (reported,) = outcome.handles
+        assert (reported.operator, reported.dead_man) == ("desk-page-3", False)
         assert outcome.operating.handle(LATER_S) is None
         assert after(outcome.operating, event).handles == ()
 
@@ -71,14 +71,14 @@ def test_a_silent_page_has_released_the_handle_and_has_to_grab_it_anew() -> None
     operating = doing(Grabbed(3, 10.0, HERE), Alive(3, 10.2))
     assert waited(operating, 10.4, lease_s=0.25).handles == ()
     outcome = waited(operating, 10.5, lease_s=0.25)
-    assert [told.dead_man for told in outcome.handles] == [False]
+    assert [reported.dead_man for reported in outcome.handles] == [False]
     assert outcome.notices[0][0] == 3
     assert after(outcome.operating, Moved(3, 10.6, THERE)).operating.operator == ""
 
 
 def test_stop_releases_whoever_operates_until_the_handle_is_grabbed_anew() -> None:
     outcome = after(doing(Grabbed(3, 10.0, HERE)), Stopped())
-    assert [told.dead_man for told in outcome.handles] == [False]
+    assert [reported.dead_man for reported in outcome.handles] == [False]
     assert after(outcome.operating, Moved(3, 10.1, THERE)).operating.handle(LATER_S) is None
     assert after(Operating("desk"), Stopped()).handles == ()
 
@@ -93,7 +93,7 @@ def test_the_operators_own_clutch_counts_and_nobody_elses() -> None:
     assert not held.clutch
 
 
-def test_a_pedal_is_up_again_soon_after_it_was_last_told() -> None:
+def test_a_pedal_is_up_again_soon_after_it_was_last_reported() -> None:
     operating = doing(Grabbed(3, 10.0, HERE), Pedaled(3, 10.1), Pedaled(4, 20.0))
     for now_s, down in ((10.2, True), (10.1 + PEDAL_S, False)):
         held = operating.handle(now_s)

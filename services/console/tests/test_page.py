@@ -30,7 +30,7 @@ def grab(cell: Any, client: int = 1) -> None:
     cell.until(lambda: cell.handles and cell.handles[-1][1].dead_man, "a held handle")
 
 
-def test_a_page_that_floods_is_told_once_and_counted_and_holds_nobody_up(
+def test_a_page_that_floods_is_reported_once_and_counted_and_holds_nobody_up(
     make_cell: MakeCell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cell = make_cell(lease_s=2.0)
@@ -135,9 +135,11 @@ def asked_of(data: bytes) -> list[str]:
     """Numbers of the questions in what the page's server says, whether a page lives."""
     packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]
     size = int.from_bytes(data[:8], "little")
-    told = msgpack.unpackb(zstandard.ZstdDecompressor().decompress(packed, max_output_size=size))
+    reported = msgpack.unpackb(
+        zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    )
     kind = "LocalStorageGetItemRequestMessage"
-    return [said["request_uuid"] for said in told["messages"] if said["type"] == kind]
+    return [said["request_uuid"] for said in reported["messages"] if said["type"] == kind]
 
 
 def test_a_still_hand_holds_on_as_long_as_its_page_shows_that_it_lives(
@@ -259,6 +261,6 @@ def test_a_handle_changes_its_arrows_only_while_none_of_them_is_dragged(
         cell.until(lambda: cell.handles[-1][1].position[0] == 0.7, "a motion")
         assert handle.active_axes == (True, True, False)
         # In the plane it was taken in it stays.
-        assert {told.position[2] for _, told in cell.handles} == {0.4}
+        assert {reported.position[2] for _, reported in cell.handles} == {0.4}
         drag(connection, (), "DragEnd")
         cell.until(lambda: handle.active_axes == (False, True, True), "the arrows of another")

@@ -37,7 +37,7 @@ def test_an_address_is_loopback_as_its_numbers_say(address: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "place"),
+    ("reported", "place"),
     [
         ("Robot.Example:8080", Place("robot.example", 8080)),
         ("192.0.2.1", Place("192.0.2.1", None)),
@@ -53,8 +53,8 @@ def test_an_address_is_loopback_as_its_numbers_say(address: object) -> None:
         ("é", None),
     ],
 )
-def test_a_place_is_read_as_browsers_write_it(told: str, place: Place | None) -> None:
-    assert place_of(told) == place
+def test_a_place_is_read_as_browsers_write_it(reported: str, place: Place | None) -> None:
+    assert place_of(reported) == place
 
 
 def test_a_name_is_none_of_an_address() -> None:

@@ -65,8 +65,8 @@ def test_a_process_without_a_name_is_refused_and_counted_and_ends_nothing(
     cell.until(lambda: Member("robot", "fine") in cell.service._seen.members, "one with a name")
     assert cell.service._seen.members == {Member("robot", "fine")}
     assert cell.bus.counters.refused[REFUSED] == 3
-    told = [record for record in caplog.records if "refused" in record.getMessage()]
-    assert len(told) == 1
+    reported = [record for record in caplog.records if "refused" in record.getMessage()]
+    assert len(reported) == 1
     assert cell.service.health()[0]
 
 

@@ -98,7 +98,7 @@ def test_a_trail_is_the_very_same_as_long_as_nothing_was_added() -> None:
     assert len(trail.pieces.segments) == 2
 
 
-def test_history_has_a_column_for_each_number_and_gaps_where_it_was_not_told() -> None:
+def test_history_has_a_column_for_each_number_and_gaps_where_it_was_not_reported() -> None:
     rows = written(written((), 10.0, {"a": 1.0}), 10.5, {"a": 2.0, "b": 3.0})
     times, a, b = columns(rows, ("a", "b"))
     assert_allclose(times, [-0.5, 0.0])
@@ -183,7 +183,7 @@ def test_a_label_is_true_from_the_step_the_hand_is_making_now() -> None:
     assert requests.label("in", "", None) == Label(state="in")
 
 
-def test_demonstrations_are_told_apart_by_commas_and_blanks() -> None:
+def test_demonstrations_are_distinguished_by_commas_and_blanks() -> None:
     asked = requests.train(" mine ", "demo", "a.csv, b.csv\n c.hdf5", "")
     assert (asked.service, asked.verb.name) == ("trainer", "train")
     assert asked.body == Train(
@@ -203,7 +203,7 @@ def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "task", "files", "told"),
+    ("model", "task", "files", "reported"),
     [
         ("", "demo", "a.csv", "model '' cannot be part of a key"),
         ("a/b", "demo", "a.csv", "use 1 to 64 letters"),
@@ -211,8 +211,8 @@ def test_a_recording_without_a_name_gets_one_from_the_recorder() -> None:
         ("mine", "demo", " , ", "name the recordings to learn from"),
     ],
 )
-def test_a_training_nobody_could_carry_out_is_told_and_not_asked_for(
-    model: str, task: str, files: str, told: str
+def test_a_training_nobody_could_carry_out_is_reported_and_not_asked_for(
+    model: str, task: str, files: str, reported: str
 ) -> None:
-    with pytest.raises(requests.RequestError, match=told):
+    with pytest.raises(requests.RequestError, match=reported):
         requests.train(model, task, files, "")

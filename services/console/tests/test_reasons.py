@@ -85,7 +85,7 @@ def fixture(progress: float, state: str = "reach", gesteme: str = "reach") -> Fi
     )
 
 
-def told(
+def reported(
     said: Belief,
     *heard: Evidence,
     leads: FixtureState | None = None,
@@ -97,50 +97,50 @@ def told(
 
 
 def test_odds_are_in_nats_and_rivals_come_by_their_probability() -> None:
-    rivals = told(belief(0.64, 0.08, 0.0, 0.16)).rivals
+    rivals = reported(belief(0.64, 0.08, 0.0, 0.16)).rivals
     assert [rival.state for rival in rivals] == ["turn-back", "turn"]
     odds = [rival.odds_nats for rival in rivals]
     assert odds == pytest.approx([1.386294, 2.079442], abs=1e-5)  # ln 4, ln 8
     assert [rival.follows for rival in rivals] == [False, True]
 
 
-def test_what_may_follow_is_told_though_nothing_speaks_for_it_yet() -> None:
-    (rival,) = told(belief(1.0, 0.0, 0.005, 0.0)).rivals
+def test_what_may_follow_is_reported_though_nothing_speaks_for_it_yet() -> None:
+    (rival,) = reported(belief(1.0, 0.0, 0.005, 0.0)).rivals
     assert (rival.state, rival.probability, rival.odds_nats) == ("turn", 0.0, None)
 
 
-def test_few_rivals_are_told_of_many() -> None:
+def test_few_rivals_are_reported_of_many() -> None:
     lesson = lesson_task()
     states = [lesson.states[0].model_copy(update={"name": f"s{number}"}) for number in range(9)]
     many = lesson.model_copy(update={"states": tuple(states)})
     names = tuple(state.name for state in states)
     said = belief(*[0.2, *[0.1] * 8], states=names)
-    assert len(told(said, task=many).rivals) == MOST_RIVALS
+    assert len(reported(said, task=many).rivals) == MOST_RIVALS
 
 
-def test_progress_is_told_along_the_guide_that_leads() -> None:
-    reasons = told(belief(0.9, 0.1, 0.0, 0.0), leads=fixture(0.75))
+def test_progress_is_reported_along_the_guide_that_leads() -> None:
+    reasons = reported(belief(0.9, 0.1, 0.0, 0.0), leads=fixture(0.75))
     assert (reasons.likely, reasons.gesteme, reasons.progress) == ("reach", "reach", 0.75)
     assert reasons.left_m == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("leads", [None, fixture(0.75, "turn", "turn"), fixture(0.75, "reach", "")])
-def test_where_nothing_leads_in_the_likely_state_neither_progress_nor_turns_are_told(
+def test_where_nothing_leads_in_the_likely_state_neither_progress_nor_turns_are_reported(
     leads: FixtureState | None,
 ) -> None:
-    reasons = told(belief(0.9, 0.1, 0.0, 0.0), leads=leads)
+    reasons = reported(belief(0.9, 0.1, 0.0, 0.0), leads=leads)
     assert (reasons.progress, reasons.left_m) == (None, None)
     assert {rival.turn_rad for rival in reasons.rivals} == {None}
 
 
 def test_what_follows_would_turn_the_hand_to_where_its_guide_begins() -> None:
-    (rival,) = told(belief(0.9, 0.1, 0.0, 0.0), leads=fixture(0.25)).rivals
+    (rival,) = reported(belief(0.9, 0.1, 0.0, 0.0), leads=fixture(0.25)).rivals
     assert rival.turn_rad == pytest.approx(np.pi / 2)
     assert_allclose(rival.toward, -Z, atol=1e-9)
 
 
 def test_what_was_before_would_have_the_hand_go_on_to_its_end() -> None:
-    rivals = told(belief(0.8, 0.0, 0.0, 0.2), leads=fixture(0.25)).rivals
+    rivals = reported(belief(0.8, 0.0, 0.0, 0.2), leads=fixture(0.25)).rivals
     # turn-back ends along y; at its beginning it goes down.
     assert rivals[0].state == "turn-back"
     assert_allclose(rivals[0].toward, Y, atol=1e-9)
@@ -152,7 +152,7 @@ def test_who_explains_the_same_segment_otherwise_is_as_far_along_if_it_lives(
 ) -> None:
     # 150 mm along: on the second leg of reach, which leads along y, and of lift, along −x.
     heard = evidence({"lift": ratios})
-    rivals = told(belief(0.8, 0.0, 0.2, 0.0), heard, leads=fixture(0.75)).rivals
+    rivals = reported(belief(0.8, 0.0, 0.2, 0.0), heard, leads=fixture(0.75)).rivals
     assert rivals[0].state == "lift"
     assert rivals[0].turn_rad == pytest.approx(np.pi / 2)
     assert_allclose(rivals[0].toward, expected, atol=1e-9)
@@ -180,7 +180,7 @@ def test_a_turn_is_an_angle_and_a_side(
 def test_support_is_that_of_the_gestemes_begun_with_the_segment_whoever_holds_them() -> None:
     one = evidence({"reach": {11: 9.0, 12: 0.75, 13: 9.0}})
     other = evidence({"turn": {12: -1.5, 40: 9.0}, "lift": {12: 9.0}})
-    support = told(belief(0.9, 0.1, 0.0, 0.0), one, other).support
+    support = reported(belief(0.9, 0.1, 0.0, 0.0), one, other).support
     assert [(each.state, each.log_ratio_nats) for each in support] == [
         ("reach", 0.75),
         ("turn", -1.5),
@@ -193,11 +193,11 @@ def test_a_gesteme_that_is_held_without_that_beginning_is_ruled_out_and_one_not_
     heard = (evidence({"turn": {40: 1.0}}),)
     assert log_ratio(heard, "turn", 12) == (True, None)
     assert log_ratio(heard, "reach", 12) == (False, None)
-    support = told(belief(0.9, 0.1, 0.0, 0.0), *heard).support
+    support = reported(belief(0.9, 0.1, 0.0, 0.0), *heard).support
     assert [(each.gesteme, each.log_ratio_nats) for each in support] == [("turn", None)]
 
 
-def test_nothing_is_told_where_nothing_is_believed_or_of_another_task() -> None:
+def test_nothing_is_reported_where_nothing_is_believed_or_of_another_task() -> None:
     for said in (None, belief(states=(), likely_gesteme=""), belief(1.0, states=("else",))):
         assert reasons_of(said, (), None, lesson_task(), PATHS) is None
     assert reasons_of(belief(1.0, 0.0, 0.0, 0.0), (), None, None, {}) is None
@@ -243,7 +243,7 @@ def test_evidence_of_the_newest_steps_only_is_kept() -> None:
 
 def test_reasons_are_put_in_words() -> None:
     heard = evidence({"reach": {12: 0.75}, "turn": {40: 1.0}})
-    said = spoken_reasons.reasons(told(belief(0.8, 0.1, 0.0, 0.1), heard, leads=fixture(0.25)))
+    said = spoken_reasons.reasons(reported(belief(0.8, 0.1, 0.0, 0.1), heard, leads=fixture(0.25)))
     for part in (
         "25% along reach's path, 150 mm to go",
         "reach +0.75 nats",
@@ -256,7 +256,7 @@ def test_reasons_are_put_in_words() -> None:
 
 
 def test_only_what_is_known_is_put_in_words() -> None:
-    said = spoken_reasons.reasons(told(belief(1.0, 0.0, 0.0, 0.0)))
+    said = spoken_reasons.reasons(reported(belief(1.0, 0.0, 0.0, 0.0)))
     assert "**turn** (0%, may follow)" in said
     for part in ("along", "nats", "hand that", "None"):
         assert part not in said

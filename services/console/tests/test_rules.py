@@ -38,7 +38,7 @@ points = st.tuples(coordinates, coordinates, coordinates).map(np.array)
 rules = st.builds(rule_of, st.sampled_from(list(KEPT_TO)), st.floats(SMALLEST, LARGEST))
 
 
-def told(operating: Operating) -> NDArray[np.float64]:
+def reported(operating: Operating) -> NDArray[np.float64]:
     handle = operating.handle(10.0 + 2 * SETTLE_S)
     assert handle is not None
     return handle.position
@@ -66,44 +66,44 @@ def test_a_change_of_rule_makes_no_held_handle_jump(
     before: Rule, meanwhile: list[Rule], at: NDArray[np.float64]
 ) -> None:
     operating = doing(Ruled(3, before), Grabbed(3, 10.0, HERE), Moved(3, 10.0, at))
-    place = told(operating)
+    place = reported(operating)
     for rule in meanwhile:
         operating = after(operating, Ruled(3, rule)).operating
-        assert_allclose(told(operating), place)
+        assert_allclose(reported(operating), place)
         operating = after(operating, Moved(3, 10.0, at)).operating
-        assert_allclose(told(operating), place)
+        assert_allclose(reported(operating), place)
 
 
 @given(moves=st.lists(st.one_of(points, rules), min_size=1), first=rules)
-def test_however_rules_change_what_is_told_moves_no_farther_than_the_handle_scaled(
+def test_however_rules_change_what_is_reported_moves_no_farther_than_the_handle_scaled(
     moves: list[NDArray[np.float64] | Rule], first: Rule
 ) -> None:
     operating = doing(Ruled(3, first), Grabbed(3, 10.0, HERE))
-    handle, place = HERE, told(operating)
+    handle, place = HERE, reported(operating)
     for move in moves:
         if isinstance(move, Rule):
             operating = after(operating, Ruled(3, move)).operating
         else:
             operating = after(operating, Moved(3, 10.0, move)).operating
             reach = first.scale * float(np.linalg.norm(move - handle))
-            assert float(np.linalg.norm(told(operating) - place)) <= reach + 1e-9
+            assert float(np.linalg.norm(reported(operating) - place)) <= reach + 1e-9
             handle = move
-        place = told(operating)
+        place = reported(operating)
 
 
 def test_a_changed_rule_holds_from_the_next_time_the_handle_is_taken() -> None:
     flat = rule_of("plane x y", 0.5)
     held = doing(Grabbed(3, 10.0, HERE), Ruled(3, flat), Moved(3, 10.0, HERE + 0.1))
-    assert_allclose(told(held), HERE + 0.1)
+    assert_allclose(reported(held), HERE + 0.1)
     again = after(held, Grabbed(3, 10.0, HERE)).operating
     moved = after(again, Moved(3, 10.0, HERE + 0.1)).operating
-    assert_allclose(told(moved) - HERE, [0.05, 0.05, 0.0], atol=1e-12)
+    assert_allclose(reported(moved) - HERE, [0.05, 0.05, 0.0], atol=1e-12)
 
 
 def test_a_page_has_its_own_rule_and_takes_it_along() -> None:
     flat = rule_of("plane y z", 2.0)
     operating = doing(Ruled(4, flat), Grabbed(3, 10.0, HERE), Moved(3, 10.0, HERE + 0.1))
-    assert_allclose(told(operating), HERE + 0.1)
+    assert_allclose(reported(operating), HERE + 0.1)
     assert operating.rules == {4: flat}
     assert doing(Ruled(4, flat), Gone(4)).rules == {}
     assert doing(Ruled(4, flat), Ruled(4, FREE)).rules == {}
@@ -116,7 +116,7 @@ def test_what_no_page_offers_is_no_rule() -> None:
 
 
 @pytest.mark.parametrize(
-    "told",
+    "reported",
     [
         (0.0, 0.0),
         (0.0, 0.0, float("nan")),
@@ -127,8 +127,8 @@ def test_what_no_page_offers_is_no_rule() -> None:
         {},
     ],
 )
-def test_what_is_no_place_of_a_handle_is_left_out(told: object) -> None:
-    assert position_of(told) is None
+def test_what_is_no_place_of_a_handle_is_left_out(reported: object) -> None:
+    assert position_of(reported) is None
 
 
 def test_a_place_of_a_handle_is_read() -> None:

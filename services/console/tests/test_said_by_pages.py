@@ -111,21 +111,21 @@ NONSENSE: tuple[dict[str, Any], ...] = (
 )
 
 
-@pytest.mark.parametrize("told", FRIENDLY, ids=lambda told: told["type"])
-def test_what_a_page_says_is_handed_on(told: dict[str, Any]) -> None:
-    assert msgpack.unpackb(said(msgpack.packb(told))) == told
+@pytest.mark.parametrize("reported", FRIENDLY, ids=lambda reported: reported["type"])
+def test_what_a_page_says_is_handed_on(reported: dict[str, Any]) -> None:
+    assert msgpack.unpackb(said(msgpack.packb(reported))) == reported
 
 
-@pytest.mark.parametrize("told", HOSTILE, ids=str)
-def test_what_no_page_says_is_hostile(told: Any) -> None:
+@pytest.mark.parametrize("reported", HOSTILE, ids=str)
+def test_what_no_page_says_is_hostile(reported: Any) -> None:
     with pytest.raises(HostileError):
-        said(msgpack.packb(told))
+        said(msgpack.packb(reported))
 
 
-@pytest.mark.parametrize("told", NONSENSE, ids=str)
-def test_a_pose_that_is_none_is_nonsense(told: dict[str, Any]) -> None:
+@pytest.mark.parametrize("reported", NONSENSE, ids=str)
+def test_a_pose_that_is_none_is_nonsense(reported: dict[str, Any]) -> None:
     with pytest.raises(NonsenseError):
-        said(msgpack.packb(told))
+        said(msgpack.packb(reported))
 
 
 @pytest.mark.parametrize(
@@ -150,14 +150,14 @@ VALUES = st.recursive(
 
 @given(st.sampled_from(FRIENDLY), st.dictionaries(st.text(max_size=8), VALUES, max_size=2), VALUES)
 def test_anything_is_handed_on_or_refused(
-    told: dict[str, Any], more: dict[str, Any], value: Any
+    reported: dict[str, Any], more: dict[str, Any], value: Any
 ) -> None:
-    for data in (told | more, told | dict.fromkeys(list(told)[1:2], value)):
+    for data in (reported | more, reported | dict.fromkeys(list(reported)[1:2], value)):
         try:
             handed_on = said(msgpack.packb(data))
         except (HostileError, NonsenseError):
             continue
-        assert msgpack.unpackb(handed_on)["type"] == told["type"]
+        assert msgpack.unpackb(handed_on)["type"] == reported["type"]
 
 
 def framed(*messages: Any, opcode: Opcode = Opcode.BINARY) -> bytes:

@@ -148,7 +148,7 @@ def test_every_state_of_every_task_that_comes_along_has_a_row(name: str) -> None
     assert "**" not in rows[0]
 
 
-def test_what_a_state_has_of_its_own_is_told(known: Model) -> None:
+def test_what_a_state_has_of_its_own_is_reported(known: Model) -> None:
     of_state = {
         "law": "thesis",
         "compliance": "fixed",
@@ -167,7 +167,7 @@ def test_what_a_state_has_of_its_own_is_told(known: Model) -> None:
         assert part in inside
 
 
-def test_without_a_known_model_no_rules_are_told() -> None:
+def test_without_a_known_model_no_rules_are_reported() -> None:
     assert "No recognizer" in spoken_rules.rules(None, "")
 
 
@@ -229,19 +229,19 @@ def test_hops_of_both_loops_are_written_down(make_cell: MakeCell) -> None:
     beliefs.put(believed(), ORIGIN)
     wanted = {"input → fixture", "fixture → robot", "step → belief"}
 
-    def told() -> set[str]:
+    def reported() -> set[str]:
         rows = cell.service._seen.picture(time.monotonic(), "", None).rows
         return wanted & set(rows[-1].numbers) if rows else set()
 
-    cell.until(lambda: told() == wanted, "hops")
+    cell.until(lambda: reported() == wanted, "hops")
 
 
 def test_a_belief_comes_with_the_evidence_it_stands_on(make_cell: MakeCell) -> None:
     cell = make_cell()
     other = cell.other
-    told = other.publisher(Evidence, other.keys.evidence("lines", "x"))
+    reported = other.publisher(Evidence, other.keys.evidence("lines", "x"))
     beliefs = other.publisher(Belief, other.keys.belief("lines"))
-    for publisher in (told, beliefs):
+    for publisher in (reported, beliefs):
         cell.until(lambda publisher=publisher: publisher.matching, "the console")
     evidence = Evidence(
         model_hash="h",
@@ -253,8 +253,8 @@ def test_a_belief_comes_with_the_evidence_it_stands_on(make_cell: MakeCell) -> N
         exit=np.zeros(1, dtype=np.float32),
         log_ratio=np.full(1, 0.5, dtype=np.float32),
     )
-    told.put(evidence.model_copy(update={"pair_start": np.zeros(2, dtype=np.int32)}))
-    told.put(evidence)
+    reported.put(evidence.model_copy(update={"pair_start": np.zeros(2, dtype=np.int32)}))
+    reported.put(evidence)
     beliefs.put(believed())
 
     def seen() -> Picture:

@@ -50,7 +50,7 @@ def test_the_page_is_served_whole_at_the_reported_port(make_cell: MakeCell) -> N
     assert hosts <= {"www.w3.org"}
 
 
-def test_a_port_that_is_taken_gives_way_to_the_next_and_the_real_one_is_told(
+def test_a_port_that_is_taken_gives_way_to_the_next_and_the_real_one_is_reported(
     make_cell: MakeCell,
 ) -> None:
     with socket.socket() as other:
@@ -63,7 +63,7 @@ def test_a_port_that_is_taken_gives_way_to_the_next_and_the_real_one_is_told(
         assert get(page)[0] == 200
 
 
-def test_a_host_that_is_not_ours_is_told(make_cell: MakeCell) -> None:
+def test_a_host_that_is_not_ours_is_reported(make_cell: MakeCell) -> None:
     with pytest.raises(UserError, match=r"the page cannot be served at 203\.0\.113\.1:"):
         make_cell(host="203.0.113.1", token="a long secret")
 
@@ -77,7 +77,9 @@ def test_who_brings_the_token_is_let_in_and_nobody_else(make_cell: MakeCell) -> 
     assert get(url, Cookie=headers["Set-Cookie"].partition(";")[0])[0] == 200
 
 
-def test_a_held_handle_is_told_often_however_seldom_the_page_is_drawn(make_cell: MakeCell) -> None:
+def test_a_held_handle_is_reported_often_however_seldom_the_page_is_drawn(
+    make_cell: MakeCell,
+) -> None:
     cell = make_cell(lease_s=2.0, rate_hz=2)
     grab(cell)
     count, began_s = len(cell.handles), time.monotonic()
@@ -87,7 +89,7 @@ def test_a_held_handle_is_told_often_however_seldom_the_page_is_drawn(make_cell:
     assert all(handle.dead_man for _, handle in cell.handles[count:])
 
 
-def test_a_held_handle_is_told_at_a_rate_and_released_once_the_lease_lapses(
+def test_a_held_handle_is_reported_at_a_rate_and_released_once_the_lease_lapses(
     make_cell: MakeCell,
 ) -> None:
     cell = make_cell(lease_s=1.5, rate_hz=50)
@@ -175,22 +177,22 @@ def test_the_pedal_of_any_device_marks_the_parts_of_the_task_one_after_another(
 ) -> None:
     cell = make_cell(models=(model_file,))
     steps = cell.other.publisher(Step, cell.other.keys.step)
-    told: list[tuple[str, int]] = []
+    reported: list[tuple[str, int]] = []
     for index, mark in enumerate([False, True, False, True, True, True]):
         way = np.array([0.01, 0.0, 0.0])
         steps.put(Step(index=index, position=index * way, displacement=way, mark=mark))
         if mark:
-            count = len(told) + 1
+            count = len(reported) + 1
             cell.until(lambda count=count: len(cell.labels) >= count, "a label")  # type: ignore[misc]
-            told.append((cell.labels[-1].state, cell.labels[-1].step))
+            reported.append((cell.labels[-1].state, cell.labels[-1].step))
             assert cell.labels[-1].clock == cell.other.source.boot
-    assert told == [("free", 1), ("in", 3), ("", 4), ("free", 5)]
+    assert reported == [("free", 1), ("in", 3), ("", 4), ("free", 5)]
     cell.service.mark_by_pedal(False)
     cell.until(lambda: not cell.service.marks_by_pedal, "the change")
     way = np.array([0.01, 0.0, 0.0])
     steps.put(Step(index=6, position=6 * way, displacement=way, mark=True))
     cell.service.label("in")
-    cell.until(lambda: len(cell.labels) > len(told), "the button's label")
+    cell.until(lambda: len(cell.labels) > len(reported), "the button's label")
     assert (cell.labels[-1].state, cell.labels[-1].step) == ("in", 7)
 
 

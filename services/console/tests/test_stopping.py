@@ -37,13 +37,13 @@ def robot(make_process: MakeProcess, cell: Any, name: str, stop: Callable[[Ask],
     return make_process(cell, "robot", name, {"stop": (Ask, stop)})
 
 
-def stop_until(cell: Any, told: Callable[[str], bool]) -> None:
+def stop_until(cell: Any, reported: Callable[[str], bool]) -> None:
     """Stop again and again, as one would until everybody is there, and has answered."""
 
     def stopped() -> bool:
         cell.service.stop()
         cell.wait(0.1)
-        return told(cell.service.answer)
+        return reported(cell.service.answer)
 
     cell.until(stopped, "an answer to stop")
 
@@ -54,7 +54,7 @@ def test_stop_asks_every_robot_to_stand_and_tells_what_came_of_it(
     cell = make_cell(lease_s=2.0)
     robot(make_process, cell, "one", stands)
     robot(make_process, cell, "two", refuses)
-    stop_until(cell, lambda told: "robot one stands" in told and "no brakes" in told)
+    stop_until(cell, lambda reported: "robot one stands" in reported and "no brakes" in reported)
     assert "robot two **may still move**: robot refused: no brakes" in cell.service.answer
     # Whether anybody holds a handle or not; and whoever does has let go.
     grab(cell)
@@ -64,10 +64,10 @@ def test_stop_asks_every_robot_to_stand_and_tells_what_came_of_it(
 
 def test_stop_tells_where_no_robot_is_there(make_cell: MakeCell) -> None:
     cell = make_cell()
-    stop_until(cell, lambda told: "no robot is there" in told)
+    stop_until(cell, lambda reported: "no robot is there" in reported)
 
 
-def test_a_robot_that_gives_no_answer_may_still_move_which_is_told_and_holds_nobody_up(
+def test_a_robot_that_gives_no_answer_may_still_move_which_is_reported_and_holds_nobody_up(
     make_cell: MakeCell, make_process: MakeProcess
 ) -> None:
     cell = make_cell()
@@ -79,7 +79,7 @@ def test_a_robot_that_gives_no_answer_may_still_move_which_is_told_and_holds_nob
 
     robot(make_process, cell, "hung", hangs)
     robot(make_process, cell, "well", stands)
-    stop_until(cell, lambda told: "well stands" in told and "hung is asked" in told)
+    stop_until(cell, lambda reported: "well stands" in reported and "hung is asked" in reported)
     cell.until(
         lambda: "robot hung **may still move**: robot gave no answer" in cell.service.answer,
         "what came of it",
@@ -115,7 +115,7 @@ def test_every_robot_is_asked_at_once_however_many_do_not_answer(
     ending.set()
 
 
-def test_whoever_hears_it_is_told_to_stand_seen_or_not(make_cell: MakeCell) -> None:
+def test_whoever_hears_it_is_asked_to_stand_seen_or_not(make_cell: MakeCell) -> None:
     cell = make_cell()
     for number in range(2 * MOST_ASKED):
         cell.other.announce(cell.other.keys.presence("robot", f"a-ghost-{number}"))
@@ -132,6 +132,6 @@ def test_whoever_hears_it_is_told_to_stand_seen_or_not(make_cell: MakeCell) -> N
     assert cell.service.answer.count("not awaited") == MOST_ASKED
 
 
-def test_what_came_of_a_stop_is_told_robot_by_robot() -> None:
-    told = said({Member("robot", "a"): "", Member("robot", "b"): "stands"}).split("  \n")
-    assert told[1:] == ["robot a is asked to stand …", "robot b stands"]
+def test_what_came_of_a_stop_is_reported_robot_by_robot() -> None:
+    reported = said({Member("robot", "a"): "", Member("robot", "b"): "stands"}).split("  \n")
+    assert reported[1:] == ["robot a is asked to stand …", "robot b stands"]

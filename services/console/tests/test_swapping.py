@@ -78,7 +78,7 @@ class Others:
         self.cell.until(lambda: seen.training, "what was trained")
 
     @property
-    def told(self) -> str:
+    def reported(self) -> str:
         return str(self.cell.service._seen.takeover)
 
     def _move(self) -> None:
@@ -134,12 +134,12 @@ def test_what_was_trained_runs_beside_the_active_one_before_it_is_activated(
     others = Others(cell, make_process)
     others.train()
     cell.service.take_over()
-    others.go_on(lambda: "runs beside old" in others.told, "the comparison")
+    others.go_on(lambda: "runs beside old" in others.reported, "the comparison")
     assert others.asked == ["lend", "load"]
-    others.go_on(lambda: "steps, active in 1 s" in others.told, "what they agree in")
-    others.go_on(lambda: "took over" in others.told, "the end")
+    others.go_on(lambda: "steps, active in 1 s" in others.reported, "what they agree in")
+    others.go_on(lambda: "took over" in others.reported, "the end")
     assert others.asked == ["lend", "load", "activate"]
-    assert "beside old: the same likely state in" in others.told
+    assert "beside old: the same likely state in" in others.reported
     others.go_on(lambda: cell.service._seen.active(0.0) == "mine", "the newcomer")
     others.cell.wait(0.2)
     cell.service.back()
@@ -153,7 +153,7 @@ def test_who_is_in_a_hurry_waits_for_no_comparison(
     others = Others(cell, make_process)
     others.train()
     cell.service.take_over()
-    others.go_on(lambda: "active in" in others.told, "the comparison")
+    others.go_on(lambda: "active in" in others.reported, "the comparison")
     cell.service.activate_now()
     others.go_on(lambda: others.active == "mine", "the newcomer")
 
@@ -167,8 +167,8 @@ def test_a_refusal_leaves_active_what_was_active(
     others.refuses = refuses
     others.train()
     cell.service.take_over()
-    others.go_on(lambda: "old is active still" in others.told, "the end")
-    assert "no such file" in others.told
+    others.go_on(lambda: "old is active still" in others.reported, "the end")
+    assert "no such file" in others.reported
     assert others.asked[-1] == refuses
     assert others.active == "old"
 
@@ -205,7 +205,7 @@ def test_a_recognizer_is_activated_as_soon_as_a_process_runs_it(
     others.go_on(lambda: others.active == "mine", "the newcomer")
 
 
-def test_a_recognizer_that_is_followed_and_run_by_nobody_is_told(
+def test_a_recognizer_that_is_followed_and_run_by_nobody_is_reported(
     make_cell: MakeCell, make_process: MakeProcess
 ) -> None:
     cell = make_cell()

@@ -60,7 +60,7 @@ def test_a_newcomer_is_lent_to_the_fixture_then_loaded_then_compared_then_activa
     )
 
 
-def test_how_it_does_beside_the_active_one_is_told_with_what_was_said_on_loading_it() -> None:
+def test_how_it_does_beside_the_active_one_is_reported_with_what_was_said_on_loading_it() -> None:
     comparing = takeover.at(loaded().takeover, 12.4, Agreement(117, 120), there=True).takeover
     assert takeover.said(comparing, 12.4) == (
         "**mine** runs beside old: the same likely state in 98% of 120 steps, active in 3 s"
@@ -68,7 +68,7 @@ def test_how_it_does_beside_the_active_one_is_told_with_what_was_said_on_loading
     )
 
 
-def test_a_hand_that_does_not_move_compares_nothing_which_is_told() -> None:
+def test_a_hand_that_does_not_move_compares_nothing_which_is_reported() -> None:
     comparing = takeover.at(loaded().takeover, 12.0, NOTHING, there=True)
     assert "the hand does not move: nothing is compared" in takeover.said(comparing.takeover, 12.0)
     end = takeover.at(comparing.takeover, 15.0, NOTHING, there=True)

@@ -34,7 +34,7 @@ STATES = ("free", "in")
 
 def outline(**changed: Any) -> Outline:
     """Ten seconds along x, one meter in all, its first half labeled."""
-    told = {
+    reported = {
         "recordings": ("two.mcap", "one.mcap"),
         "recording": "two.mcap",
         "path": "/takes/two.mcap",
@@ -45,7 +45,7 @@ def outline(**changed: Any) -> Outline:
         "end_s": np.array([5.0]),
         "states": ("free",),
     }
-    return Outline(**(told | changed))
+    return Outline(**(reported | changed))
 
 
 def take(**changed: Any) -> Take:

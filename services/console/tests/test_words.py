@@ -157,17 +157,17 @@ def test_a_training_tells_its_stage_and_where_the_model_is() -> None:
     assert "No training" in words.training(None)
 
 
-def test_how_to_engage_let_go_clutch_and_stop_is_told() -> None:
+def test_how_to_engage_let_go_clutch_and_stop_is_reported() -> None:
     for part in ("Engage", "dead-man", "Let go", "Clutch", "Stop", "Keep to", "Scale"):
         assert part in words.operating()
 
 
-def test_who_operates_is_told() -> None:
+def test_who_operates_is_reported() -> None:
     assert "desk-page-1" in words.operates("desk-page-1")
     assert "Nobody" in words.operates("")
 
 
-def test_what_is_marked_and_what_the_pedal_would_mark_is_told() -> None:
+def test_what_is_marked_and_what_the_pedal_would_mark_is_reported() -> None:
     order = Order("take", {"take": {"set": 1.0}, "set": {}})
     assert words.marking(Marking(order, True)) == (
         "nothing is marked; the pedal (key P) begins **take**"

@@ -89,7 +89,7 @@ def test_a_text_is_written_as_it_reads_and_markdown_as_it_is_laid_out(server: Se
 
 
 @given(st.lists(st.text(min_size=1), max_size=8))
-def test_names_in_a_list_are_told_apart_and_lead_to_what_they_are_of(names: list[str]) -> None:
+def test_names_in_a_list_are_distinguished_and_lead_to_what_they_are_of(names: list[str]) -> None:
     named = shown_names(names)
     assert list(named.values()) == list(dict.fromkeys(names))
     assert all(shown.isprintable() and shown not in ("", NOTHING) for shown in named)

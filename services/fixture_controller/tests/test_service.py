@@ -158,7 +158,7 @@ def test_a_recognizer_is_loaded_and_activated_on_demand(
     assert (cell.states[-1].reason, cell.states[-1].model) == ("guiding", "lines")
 
 
-def test_a_model_of_another_task_than_the_followed_one_is_told(
+def test_a_model_of_another_task_than_the_followed_one_is_reported(
     make_cell: MakeCell, make_model: MakeModel
 ) -> None:
     cell = make_cell(models=(make_model("circles"),), active_model="circles")

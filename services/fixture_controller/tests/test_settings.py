@@ -45,12 +45,12 @@ def test_two_models_of_one_name_are_refused(make_model: Callable[..., Path]) -> 
         load_models(paths)
 
 
-def test_a_folder_without_models_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_models_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"no model file \(\*.hmcs\) in this folder"):
         load_models([tmp_path])
 
 
-def test_a_truncated_model_file_is_told(make_model: Callable[..., Path]) -> None:
+def test_a_truncated_model_file_is_reported(make_model: Callable[..., Path]) -> None:
     path = make_model()
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(UserError, match="truncated"):

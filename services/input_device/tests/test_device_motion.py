@@ -55,7 +55,7 @@ def test_without_the_dead_man_nothing_moves_and_letting_go_stops_at_once() -> No
     np.testing.assert_array_equal(still.position, moving.position)
 
 
-def test_the_clutch_holds_the_hand_and_the_pedal_is_told() -> None:
+def test_the_clutch_holds_the_hand_and_the_pedal_is_reported() -> None:
     desk = Desk()
     desk.hold()
     here = desk.tell(1.0, press="hold", times=5).position
@@ -67,7 +67,7 @@ def test_the_clutch_holds_the_hand_and_the_pedal_is_told() -> None:
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-def test_a_reading_that_is_no_number_stops_the_hand_is_told_and_leaves_no_trace(
+def test_a_reading_that_is_no_number_stops_the_hand_is_reported_and_leaves_no_trace(
     value: float,
 ) -> None:
     desk = Desk()

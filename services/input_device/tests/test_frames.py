@@ -12,7 +12,7 @@ from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.sources import DeviceSample
 
 
-def test_everything_of_a_sample_is_told_along_the_axes_of_the_robot() -> None:
+def test_everything_of_a_sample_is_reported_along_the_axes_of_the_robot() -> None:
     turn = Rotation.from_rotvec([0.3, -0.5, 1.1])
     held = Rotation.from_rotvec([0.1, 0.2, -0.4])
     sample = DeviceSample(
@@ -24,24 +24,24 @@ def test_everything_of_a_sample_is_told_along_the_axes_of_the_robot() -> None:
         angular_velocity=np.array([0.0, 2.0, 0.5]),
         wrench=np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3]),
     )
-    told = TaskFrame(tuple(turn.as_quat())).in_base(sample)
-    np.testing.assert_allclose(told.position, turn.apply(sample.position))
-    np.testing.assert_allclose(told.velocity, turn.apply(sample.velocity))
-    np.testing.assert_allclose(told.angular_velocity, turn.apply([0.0, 2.0, 0.5]))
-    np.testing.assert_allclose(told.wrench[:3], turn.apply([1.0, 2.0, 3.0]))
-    np.testing.assert_allclose(told.wrench[3:], turn.apply([0.1, 0.2, 0.3]))
-    between = Rotation.from_quat(told.orientation).inv() * (turn * held)
+    reported = TaskFrame(tuple(turn.as_quat())).in_base(sample)
+    np.testing.assert_allclose(reported.position, turn.apply(sample.position))
+    np.testing.assert_allclose(reported.velocity, turn.apply(sample.velocity))
+    np.testing.assert_allclose(reported.angular_velocity, turn.apply([0.0, 2.0, 0.5]))
+    np.testing.assert_allclose(reported.wrench[:3], turn.apply([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(reported.wrench[3:], turn.apply([0.1, 0.2, 0.3]))
+    between = Rotation.from_quat(reported.orientation).inv() * (turn * held)
     assert between.magnitude() < 1e-12
-    assert told.dead_man
-    assert told.pedal
+    assert reported.dead_man
+    assert reported.pedal
 
 
-def test_what_is_not_told_stays_untold() -> None:
+def test_what_is_not_reported_stays_unknown() -> None:
     sample = DeviceSample(np.zeros(3), np.zeros(3), dead_man=False)
-    told = TaskFrame((0.0, 0.0, 1.0, 0.0)).in_base(sample)
-    assert told.orientation is None
-    assert told.angular_velocity is None
-    assert told.wrench is None
+    reported = TaskFrame((0.0, 0.0, 1.0, 0.0)).in_base(sample)
+    assert reported.orientation is None
+    assert reported.angular_velocity is None
+    assert reported.wrench is None
 
 
 def test_a_frame_that_is_no_rotation_is_refused() -> None:

@@ -30,8 +30,8 @@ class Arm:
         self.says: Callable[[], Any] = lambda: DeviceSample(ZERO, ZERO, dead_man=False)
 
     def sample(self, elapsed_s: float | None) -> DeviceSample | None:
-        told: DeviceSample | None = self.says()
-        return told
+        reported: DeviceSample | None = self.says()
+        return reported
 
     def close(self) -> None:
         pass
@@ -45,8 +45,8 @@ class Desk:
         self.guarded = Guarded(self.arm, "arm")
 
     def tell(self, x_m: float = 0.0, times: int = 1, **fields: Any) -> DeviceSample:
-        told = DeviceSample(np.array([x_m, 0.0, 0.0]), ZERO, dead_man=True)._replace(**fields)
-        self.arm.says = lambda: told
+        reported = DeviceSample(np.array([x_m, 0.0, 0.0]), ZERO, dead_man=True)._replace(**fields)
+        self.arm.says = lambda: reported
         return self.ask(times)
 
     def ask(self, times: int = 1) -> DeviceSample:
@@ -71,7 +71,7 @@ class Desk:
 def test_what_a_device_tells_is_handed_on_as_it_is() -> None:
     desk = Desk()
     desk.hold()
-    told = desk.tell(
+    reported = desk.tell(
         0.01,
         velocity=np.array([0.1, 0, 0]),
         orientation=np.array([0, 0, 0, 1.0]),
@@ -82,7 +82,7 @@ def test_what_a_device_tells_is_handed_on_as_it_is() -> None:
         age_s=0.1,
     )
     for name, value in desk.arm.says()._asdict().items():
-        np.testing.assert_array_equal(getattr(told, name), value)
+        np.testing.assert_array_equal(getattr(reported, name), value)
 
 
 def test_a_device_may_reuse_its_arrays() -> None:
@@ -277,8 +277,8 @@ def test_whatever_a_device_says_there_is_a_sample_that_can_be_sent(
 ) -> None:
     desk = Desk(plays)
     desk.hold()
-    for told, period_s in ticks:
-        desk.arm.says = lambda told=told: told
+    for reported, period_s in ticks:
+        desk.arm.says = lambda reported=reported: reported
         desk.now_s += period_s
         sample = desk.guarded.sample(desk.now_s, desk.now_s)
         assert sample is not None
@@ -287,4 +287,4 @@ def test_whatever_a_device_says_there_is_a_sample_that_can_be_sent(
         if not plays:
             assert np.linalg.norm(sample.velocity) <= FASTEST_M_S
         assert sample.dead_man or not np.any(sample.velocity)
-        assert (told is None or told.dead_man) or not sample.dead_man
+        assert (reported is None or reported.dead_man) or not sample.dead_man

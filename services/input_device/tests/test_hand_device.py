@@ -40,7 +40,7 @@ def test_motion_made_while_clutched_or_released_is_taken_out_of_the_steps(
         np.testing.assert_allclose(received.body.displacement, (0.03, 0, 0), atol=1e-12)
 
 
-def test_steps_tell_what_was_felt_and_signaled_and_are_told_again_alike(
+def test_steps_tell_what_was_felt_and_signaled_and_are_reported_again_alike(
     make_desk: MakeDesk, hand: Hand
 ) -> None:
     desk = make_desk(source="hand", dead_zone_m=0.02)
@@ -64,8 +64,8 @@ def test_steps_tell_what_was_felt_and_signaled_and_are_told_again_alike(
         np.testing.assert_allclose(step.orientation, turns[k + 1], atol=1e-12)
         assert k < step.wrench[0] <= k + 1
         np.testing.assert_array_equal(step.wrench, step.wrench[0])
-    told = desk.ask("last_steps", LastStepsQuestion(count=10), LastSteps).steps
-    for step, again in zip(steps, told, strict=True):
+    reported = desk.ask("last_steps", LastStepsQuestion(count=10), LastSteps).steps
+    for step, again in zip(steps, reported, strict=True):
         for name in type(step).model_fields:
             np.testing.assert_array_equal(getattr(step, name), getattr(again, name))
 

@@ -97,7 +97,7 @@ def test_a_device_that_is_gone_stops_at_once_says_so_and_needs_a_released_dead_m
     assert desk.device.closed
 
 
-def test_it_rests_until_it_is_told_to_play_and_then_until_the_dead_man_was_released() -> None:
+def test_it_rests_until_it_is_asked_to_play_and_then_until_the_dead_man_was_released() -> None:
     desk = Desk()
     desk.hold()
     desk.device.says = DeviceReading((1.0,) * 6, frozenset({"hold"}))

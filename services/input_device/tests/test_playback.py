@@ -92,7 +92,7 @@ def test_passes_join_into_one_path_without_a_jump() -> None:
 
 
 @pytest.mark.parametrize("repeat", [1, 2, 5])
-def test_it_plays_as_often_as_told_and_then_ends(repeat: int) -> None:
+def test_it_plays_as_often_as_asked_and_then_ends(repeat: int) -> None:
     source = Playback(CURVE, Passes(lead_in_s=0.5, repeat=repeat))
     assert source.duration_s == pytest.approx(2.5 * repeat)
     held = [source.sample(t).dead_man for t in np.arange(0, source.duration_s + 2, 0.01)]
@@ -197,7 +197,7 @@ def test_switches_closer_than_a_press_are_marked_one_by_one() -> None:
     np.testing.assert_allclose(presses(source, 100), 0.5 + TIME_S[::4][:-1], atol=1e-9)
 
 
-def test_the_pedal_stays_up_without_labels_and_when_not_told_to_mark() -> None:
+def test_the_pedal_stays_up_without_labels_and_when_not_asked_to_mark() -> None:
     unlabeled = FELT._replace(states=(None,) * len(TIME_S))
     assert presses(Playback(unlabeled, Passes(mark_switches=True)), 100) == []
     assert presses(Playback(FELT, Passes()), 100) == []

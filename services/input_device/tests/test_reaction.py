@@ -61,7 +61,7 @@ def play(
     stops_at_s: set[float],
     *,
     repeat: int = 1,
-    told: Callable[[float], bool] = lambda _: True,
+    reported: Callable[[float], bool] = lambda _: True,
     hung_s: tuple[float, float] = (-1.0, -1.0),
     fixture: bool = False,
 ) -> Run:
@@ -84,7 +84,7 @@ def play(
         elif (step := zone.push(sample.position)) is not None:
             steps.append(step)
         robot.sees(now_s, dead_man=sample.dead_man)
-        if told(now_s):
+        if reported(now_s):
             reaction.robot_told(now_s, follows=fixture or robot.follows)
             reaction.fixture_told(engaged=robot.follows or not fixture)
         assert tick < 10_000, "the recording came to no end"
@@ -185,12 +185,12 @@ def test_robot_must_have_followed_in_this_pass() -> None:
 @pytest.mark.parametrize(("heard_until_s", "lets_go"), [(1.5, False), (9.0, True)])
 def test_robot_that_is_not_heard_of_is_not_waited_for(heard_until_s: float, lets_go: bool) -> None:
     reaction = Reaction(reaction_s=1.0)
-    told = []
+    reported = []
     for now_s in np.arange(0.0, 3.0, 0.01).tolist():
         if now_s < heard_until_s:
             reaction.robot_told(now_s, follows=now_s < 1.0)
-        told.append(reaction.lets_go(now_s, pressing=True))
-    assert any(told) is lets_go
+        reported.append(reaction.lets_go(now_s, pressing=True))
+    assert any(reported) is lets_go
 
 
 def test_hang_of_its_own_is_waited_out_and_answered_like_any_stop() -> None:
@@ -217,7 +217,7 @@ def test_every_pass_is_played_whole() -> None:
     assert run.held.sum() == pytest.approx(once.held.sum(), abs=4)
 
 
-def test_told_to_play_again_it_begins_anew() -> None:
+def test_asked_to_play_again_it_begins_anew() -> None:
     source = ReEngaging(
         Playback(CURVE, Passes(lead_in_s=LEAD_IN_S)), reaction := Reaction(REACTION_S)
     )

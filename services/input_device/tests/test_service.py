@@ -53,14 +53,14 @@ def test_steps_are_those_of_the_recording_and_name_the_sample_that_completed_the
             )
 
 
-def test_the_last_steps_are_told_again_with_their_origins(play: MakeDesk) -> None:
+def test_the_last_steps_are_reported_again_with_their_origins(play: MakeDesk) -> None:
     desk = play()
     desk.until_finished()
     clock = desk.bus.source.boot
-    told = desk.ask("last_steps", LastStepsQuestion(count=10_000), LastSteps)
-    assert told.clock == clock
-    assert [step.index for step in told.steps] == [r.body.index for r in desk.steps]
-    assert list(told.origins) == [r.envelope.origin for r in desk.steps]
+    reported = desk.ask("last_steps", LastStepsQuestion(count=10_000), LastSteps)
+    assert reported.clock == clock
+    assert [step.index for step in reported.steps] == [r.body.index for r in desk.steps]
+    assert list(reported.origins) == [r.envelope.origin for r in desk.steps]
     for question, indices in (
         (LastStepsQuestion(count=3), slice(-3, None)),
         (LastStepsQuestion(count=2, before=5), slice(3, 5)),
@@ -68,12 +68,12 @@ def test_the_last_steps_are_told_again_with_their_origins(play: MakeDesk) -> Non
         (LastStepsQuestion(count=10, before=0), slice(0, 0)),
         (LastStepsQuestion(count=2, before=10**6), slice(-2, None)),
     ):
-        told = desk.ask("last_steps", question, LastSteps)
+        reported = desk.ask("last_steps", question, LastSteps)
         expected = list(range(len(desk.steps)))[indices]
-        assert [step.index for step in told.steps] == expected
+        assert [step.index for step in reported.steps] == expected
 
 
-def test_it_rests_until_it_is_told_to_play_and_plays_as_often_as_told(play: MakeDesk) -> None:
+def test_it_rests_until_it_is_asked_to_play_and_plays_as_often_as_asked(play: MakeDesk) -> None:
     desk = play(autoplay=False)
     desk.until(lambda: len(desk.motions) > 20, "samples at rest")
     assert not any(received.body.dead_man for received in desk.motions)
@@ -91,7 +91,7 @@ def test_it_rests_until_it_is_told_to_play_and_plays_as_often_as_told(play: Make
     assert max(np.linalg.norm(r.body.displacement) for r in desk.steps) < 0.1
 
 
-def test_it_waits_for_those_it_is_told_to_wait_for(play: MakeDesk) -> None:
+def test_it_waits_for_those_it_is_asked_to_wait_for(play: MakeDesk) -> None:
     desk = play(wait_for=("robot", "robot", "task_hmm"))
     assert desk.service.health() == (True, "waiting for robot, robot, task_hmm")
     refused = desk.ask("play", Ask(), Done)

@@ -123,7 +123,7 @@ def test_operators_differ_and_equal_seeds_do_not() -> None:
     assert not np.array_equal(hand(operator="steady"), hand(operator="novice"))
 
 
-def test_an_operator_nobody_knows_is_told() -> None:
+def test_an_operator_nobody_knows_is_reported() -> None:
     with pytest.raises(ValueError, match="novice"):
         InputDeviceSettings(task=LINES.name, source="simulated", operator="expert")
 

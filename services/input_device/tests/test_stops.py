@@ -43,8 +43,8 @@ class Robot:
         self.stands = not (self.may_follow and held)
         if not self.stands:
             self.asked_until_s = 0.0
-        told = self.asked_until_s and (held or time.monotonic() < self.asked_until_s)
-        stop = "asked" if told else "stale_command" if self.stands else "none"
+        findings = self.asked_until_s and (held or time.monotonic() < self.asked_until_s)
+        stop = "asked" if findings else "stale_command" if self.stands else "none"
         self._states.put(
             RobotState(
                 robot="fake",

@@ -114,7 +114,7 @@ def test_a_law_measures_the_same_alone_and_among_others():
         ({"law": "pull,pull"}, "once"),
     ],
 )
-def test_unknown_names_are_told(given, says):
+def test_unknown_names_are_reported(given, says):
     with pytest.raises(UserError, match=says):
         rows_of(**given)
 
@@ -251,7 +251,7 @@ def test_an_arm_among_its_obstacles_follows_an_operator_without_touching_them():
         assert row.measures["error_mm"] < 15.0
 
 
-def test_a_robot_that_nobody_simulates_is_told():
+def test_a_robot_that_nobody_simulates_is_reported():
     settings = EXPERIMENT_1.settings_from(["robot=psychics", "demonstrations=2"])
     with pytest.raises(UserError, match="did you mean physics"):
         EXPERIMENT_1.trial(settings, np.random.default_rng(2))

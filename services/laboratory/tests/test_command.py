@@ -21,16 +21,16 @@ TINY = [
 def test_json_is_one_object_on_the_last_line(capsys):
     arguments = ["study", "noise", "--trials", "2", "--workers", "1", "--seed", "3", "--json"]
     assert main([*arguments, *TINY]) == 0
-    told = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert list(told) == ["study", "seed", "trials", "settings", "versions", "rows"]
-    assert (told["study"], told["seed"], told["trials"]) == ("noise", 3, 2)
+    reported = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert list(reported) == ["study", "seed", "trials", "settings", "versions", "rows"]
+    assert (reported["study"], reported["seed"], reported["trials"]) == ("noise", 3, 2)
     settings = find_study("noise").settings
-    assert set(told["settings"]) == set(settings.model_fields)
-    assert settings.model_validate(told["settings"]).gestemes == 4
-    assert {(row["method"], row["noise"]) for row in told["rows"]} == {
+    assert set(reported["settings"]) == set(settings.model_fields)
+    assert settings.model_validate(reported["settings"]).gestemes == 4
+    assert {(row["method"], row["noise"]) for row in reported["rows"]} == {
         (method, noise) for method in ("svm", "lda") for noise in (0.1, 0.3)
     }
-    for row in told["rows"]:
+    for row in reported["rows"]:
         for name in ("accuracy", "fit_s", "us_per_sample"):
             assert row[name] >= 0
             assert row[f"{name}_ci95"] >= 0

@@ -34,7 +34,7 @@ def test_a_path_through_the_middle_has_a_way_around_too() -> None:
 @pytest.mark.parametrize(
     ("center", "says"), [([0.2, 0.1, 0.0], "nothing to avoid"), ([0.01, 0, 0], "end of the path")]
 )
-def test_spheres_without_a_way_around_are_told(center: list[float], says: str) -> None:
+def test_spheres_without_a_way_around_are_reported(center: list[float], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         around(LINE, center, 0.02, clearance_m=0.01, run_up_m=0.03)
 
@@ -91,7 +91,7 @@ points = st.tuples(coordinates, coordinates, coordinates)
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(points, min_size=2, max_size=6, unique=True), points, st.floats(0.005, 0.05))
-def test_every_way_around_is_clear_or_it_is_told_that_there_is_none(
+def test_every_way_around_is_clear_or_it_is_reported_that_there_is_none(
     corners: list[tuple[float, ...]], center: tuple[float, ...], radius_m: float
 ) -> None:
     path, middle = Path(np.array(corners)), np.array(center)
@@ -116,7 +116,7 @@ def test_every_way_around_is_clear_or_it_is_told_that_there_is_none(
         ([0.2, 0, 0], np.inf, 0.01),
     ],
 )
-def test_numbers_that_cannot_be_are_told(
+def test_numbers_that_cannot_be_are_reported(
     center: list[float], radius_m: float, run_up_m: float
 ) -> None:
     with pytest.raises(ValueError, match="expected"):

@@ -85,7 +85,7 @@ def test_figures_that_share_data_are_made_of_the_same_settings_fast_or_not():
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.number)
-def test_a_figure_is_drawn_and_told_with_numbers(figure):
+def test_a_figure_is_drawn_and_reported_with_numbers(figure):
     made = tiny(figure.number)
     assert made.files.png.startswith(b"\x89PNG")
     assert made.files.png.endswith(b"IEND\xaeB`\x82")
@@ -131,7 +131,7 @@ def test_curves_tell_the_share_recognized_of_every_method_with_its_interval():
             assert len(numbers[f"line_{method}-hmm{floor}_ci95"]) == 2
 
 
-def test_a_hand_that_leaves_its_task_is_told_so_and_not_before():
+def test_a_hand_that_leaves_its_task_is_warned_and_not_before():
     (figure,) = find_figures(["B.2"])
     numbers = figure.draw(figure.settings, figure.generator(5)).numbers
     assert numbers["steps_to_unknown"] is not None
@@ -163,9 +163,9 @@ def folder(tmp_path_factory):
 
 def test_a_page_tells_of_each_figure_and_its_pictures_are_there(folder):
     page = (folder / PAGE).read_text(encoding="utf-8")
-    told = json.loads((folder / FINDINGS).read_text(encoding="utf-8"))
-    assert list(told["figures"]) == ["2.5", "4.11"]
-    assert told["seed"] == 1
+    reported = json.loads((folder / FINDINGS).read_text(encoding="utf-8"))
+    assert list(reported["figures"]) == ["2.5", "4.11"]
+    assert reported["seed"] == 1
     for figure in find_figures(["2.5", "4.11"]):
         assert f"Figure {figure.number}: {figure.title}" in page
         for ending in ("png", "svg"):

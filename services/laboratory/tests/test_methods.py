@@ -200,7 +200,7 @@ def test_online_peers_give_probabilities_and_look_at_nothing_to_come(method):
     assert (belief.argmax(axis=1) == performance.states).mean() > 0.8
 
 
-def test_a_missing_library_is_told_with_what_installs_it(monkeypatch, data):
+def test_a_missing_library_is_reported_with_what_installs_it(monkeypatch, data):
     monkeypatch.setitem(sys.modules, "hmmlearn", None)
     monkeypatch.delitem(sys.modules, "hmmlearn.hmm", raising=False)
     with pytest.raises(UserError, match="hmmlearn is not installed: `make peers`"):

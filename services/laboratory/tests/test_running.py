@@ -67,12 +67,12 @@ def test_a_result_says_what_it_was_made_with():
         ({"cluster": "nonsense://"}, "--cluster nonsense://: no Dask scheduler there"),
     ],
 )
-def test_what_cannot_be_run_is_told(where, message):
+def test_what_cannot_be_run_is_reported(where, message):
     with pytest.raises(UserError, match=message):
         tiny("noise", **where)
 
 
-def test_a_hand_too_noisy_to_arrive_is_told_with_what_to_do():
+def test_a_hand_too_noisy_to_arrive_is_reported_with_what_to_do():
     study = find_study("noise")
     settings = study.settings_from(["noise=30", "gestemes=2", "methods=lda"])
     with pytest.raises(UserError, match="take less noise"):

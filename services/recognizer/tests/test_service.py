@@ -100,7 +100,7 @@ def test_it_says_what_it_runs_and_how_far_it_is(bench: Bench, taught: Taught) ->
     assert bench.service.health() == (True, f"{taught.model.name}: task-hmm, 3 beliefs")
 
 
-def test_a_file_that_is_no_model_is_told(tmp_path: Path, bench: Bench) -> None:
+def test_a_file_that_is_no_model_is_reported(tmp_path: Path, bench: Bench) -> None:
     file = tmp_path / "no-model.hmcs"
     file.write_text("not a model", encoding="utf-8")
     with pytest.raises(ModelFileError, match=r"no-model\.hmcs"):
@@ -134,8 +134,8 @@ def test_it_takes_another_model_while_it_runs(bench: Bench, taught: Taught, tmp_
         by_name[recognizer_in(received.key).model].append(received.body.step)
     assert by_name[taught.model.name] == [step.index for step in steps]
     assert by_name["another"] == [step.index for step in steps[10:]]
-    told = [r.body for r in scene.watcher.beliefs if r.body.step == steps[-1].index]
-    np.testing.assert_array_equal(told[0].probabilities, told[1].probabilities)
+    reported = [r.body for r in scene.watcher.beliefs if r.body.step == steps[-1].index]
+    np.testing.assert_array_equal(reported[0].probabilities, reported[1].probabilities)
 
 
 def test_of_a_layered_model_it_tells_the_evidence_its_beliefs_stand_on(

@@ -30,8 +30,8 @@ class Bench:
         self.asker = stack.open_bus("console", "page")
         self.hand = Hand(stack.open_bus("input_device", "hand"))
         self.bus = stack.open_bus("recorder", "here")
-        told = RecorderSettings(folder=folder, flush_s=0.05, free_mb=0.0, **settings)
-        self.service = Recorder(told, self.bus, logging.getLogger("test"))
+        reported = RecorderSettings(folder=folder, flush_s=0.05, free_mb=0.0, **settings)
+        self.service = Recorder(reported, self.bus, logging.getLogger("test"))
         self.service.start()
 
     def asked(self, verb: str, question: Message, answer: type[Message]) -> Any:
@@ -53,13 +53,13 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def labels(**changed: Any) -> SetLabels:
-    told = {
+    reported = {
         "recording": "take.mcap",
         "begin_s": np.array([0.1, 0.5]),
         "end_s": np.array([0.5, 0.9]),
         "states": ("turn", "go"),
     }
-    return SetLabels(**(told | changed))
+    return SetLabels(**(reported | changed))
 
 
 def test_labels_that_are_set_are_in_the_next_outline(bench: Bench) -> None:

@@ -37,7 +37,7 @@ def test_who_was_there_and_the_models_are_kept_with_a_recording(
 # --- what is kept with it -------------------------------------------------------------------------
 
 
-def test_models_that_cannot_be_read_are_left_out_and_two_of_a_name_told_apart(
+def test_models_that_cannot_be_read_are_left_out_and_two_of_a_name_distinguished(
     stack: Stack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places = [tmp_path / "one", tmp_path / "two", tmp_path / "bad"]
@@ -122,7 +122,7 @@ def test_joints_are_shown_by_the_names_that_the_robot_says_they_have(
     assert content.attachments["two-joints.urdf"] == b"<robot/>"
 
 
-def test_that_a_robot_does_not_say_how_it_looks_is_told_and_no_names_are_invented(
+def test_that_a_robot_does_not_say_how_it_looks_is_reported_and_no_names_are_invented(
     stack: Stack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robots, "RETRY_S", 0.01)

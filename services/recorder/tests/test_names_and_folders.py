@@ -117,7 +117,9 @@ def _due(bench: Bench) -> bool:
     return False
 
 
-def test_labels_that_lie_where_a_recording_begins_are_told(stack: Stack, tmp_path: Path) -> None:
+def test_labels_that_lie_where_a_recording_begins_are_reported(
+    stack: Stack, tmp_path: Path
+) -> None:
     bench = Bench(stack, tmp_path / "recordings", autostart=False)
     said = bench.service._asked(Record(on=True, name="take")).detail
     assert said == f"recording to {bench.folder / 'take.mcap'}"

@@ -56,7 +56,7 @@ def test_messages_carry_the_time_on_the_wall_whenever_the_clock_is_set(
     assert sorted(file.name for file in bench.folder.iterdir()) == ["take-002.mcap", "take.mcap"]
 
 
-def test_a_capture_told_by_another_machines_clock_is_as_if_it_were_not_told(
+def test_a_capture_reported_by_another_machines_clock_is_as_if_it_were_not_reported(
     stack: Stack, tmp_path: Path
 ) -> None:
     bench = Bench(stack, tmp_path / "recordings")

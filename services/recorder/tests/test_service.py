@@ -46,7 +46,7 @@ def test_recording_begins_and_ends_when_asked(stack: Stack, tmp_path: Path) -> N
     assert len(list(read(tmp_path / "recordings" / "take-1.mcap").of(Motion))) == 3
 
 
-def test_a_full_disk_ends_the_recording_which_is_told_and_counted(
+def test_a_full_disk_ends_the_recording_which_is_reported_and_counted(
     stack: Stack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = Bench(stack, tmp_path / "recordings")

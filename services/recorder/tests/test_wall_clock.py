@@ -44,7 +44,7 @@ def test_times_rise_as_they_were_until_it_is_reckoned_anew(clocks: Clocks) -> No
 
 
 @pytest.mark.parametrize("by_s", [-7200, -1, 1, 8 * 3600], ids=lambda by_s: f"{by_s} s")
-def test_that_the_clock_was_set_or_the_machine_slept_is_told_once(
+def test_that_the_clock_was_set_or_the_machine_slept_is_reported_once(
     clocks: Clocks, by_s: int
 ) -> None:
     clock = clocks.made()

@@ -14,7 +14,7 @@ from hmcs_robot.arm_description import arm_description, missing_meshes
 from hmcs_robot.robots import ROBOTS
 
 
-def test_every_mesh_of_an_arm_is_told_and_every_joint_named(robot: str, arm: Arm) -> None:
+def test_every_mesh_of_an_arm_is_reported_and_every_joint_named(robot: str, arm: Arm) -> None:
     robot_description = arm_description(ROBOTS[robot].urdf, arm.joint_names)
     named = set(re.findall(r'filename="([^"]+)"', robot_description.urdf))
     assert named <= set(robot_description.files)
@@ -62,7 +62,7 @@ def test_a_mesh_is_found_by_every_name_that_descriptions_give(
 
 
 @pytest.mark.parametrize("name", ["../meshes/none.stl", "package://other/meshes/a link.stl"])
-def test_a_name_that_leads_to_no_file_is_told(package: Path, name: str) -> None:
+def test_a_name_that_leads_to_no_file_is_reported(package: Path, name: str) -> None:
     file = described(package, f'filename="{name}"')
     assert arm_description(file, ()).files == {}
     assert missing_meshes(file) == (name,)

@@ -34,7 +34,7 @@ def test_jacobian_is_the_derivative_of_forward_kinematics(arm: Arm) -> None:
             assert np.abs(jacobian[3:, joint] - angular).max() < 1e-7
 
 
-def test_a_point_of_any_link_moves_as_told(arm: Arm) -> None:
+def test_a_point_of_any_link_moves_as_commanded(arm: Arm) -> None:
     h, normal = 1e-6, np.array([0.6, 0.0, 0.8])
     for q in drawn(arm, 5):
         arm.place(q)

@@ -26,7 +26,7 @@ def test_it_begins_where_the_task_does(robot: LockstepRobot) -> None:
 
 
 @pytest.mark.parametrize("period_s", [0.01, 0.004, 0.025])
-def test_it_goes_as_far_as_it_is_told(robot: LockstepRobot, period_s: float) -> None:
+def test_it_goes_as_far_as_commanded(robot: LockstepRobot, period_s: float) -> None:
     begun = robot.position
     for _ in range(round(1.0 / period_s)):
         robot.move(UP, period_s)

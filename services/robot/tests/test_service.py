@@ -224,7 +224,7 @@ def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:
     assert away.contacts == ()
 
 
-def test_what_is_no_command_is_refused_and_told_as_the_reason(cell: Cell) -> None:
+def test_what_is_no_command_is_refused_and_reported_as_the_reason(cell: Cell) -> None:
     bus = cell.open("broken")
     raw = bus._session.declare_publisher(bus.keys.command)
     cell.engage(-0.05)
@@ -270,7 +270,7 @@ def test_a_fixture_that_drives_another_robot_moves_nothing_here(cell: Cell) -> N
     assert cell.robot.health()[1].startswith("standing: not_paired")
 
 
-def test_a_control_process_that_ends_is_told_and_ends_the_robot(cell: Cell) -> None:
+def test_a_control_process_that_ends_is_reported_and_ends_the_robot(cell: Cell) -> None:
     cell.until(lambda _: True)
     cell.robot._room._process.kill()
 

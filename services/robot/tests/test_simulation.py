@@ -201,7 +201,7 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
     assert min(nearest) > -1e-4
 
 
-def test_however_fine_a_mesh_is_few_of_its_places_are_told_and_none_is_farther_than_the_mesh(
+def test_however_fine_a_mesh_is_few_of_its_places_are_reported_and_none_is_farther_than_the_mesh(
     starts: dict[str, Pose], period_s: float, tmp_path: Path
 ) -> None:
     center, radius_m = [0.35, 0.3, 0.75], 0.25
@@ -209,12 +209,12 @@ def test_however_fine_a_mesh_is_few_of_its_places_are_told_and_none_is_farther_t
     for finer in (2, 6):
         mesh = ball_of_triangles(tmp_path, center, radius_m, finer)
         sphere = region(shape="sphere", position_m=center, radius_m=radius_m)
-        told = []
+        reported = []
         for around in (mesh, sphere):
             simulation = Simulation(Scene("puma560", starts["puma560"], (), (around,)), period_s)
-            told.append(simulation.read().links_near)
+            reported.append(simulation.read().links_near)
             simulation.close()
-        near, exactly = told
+        near, exactly = reported
         assert len(near) >= len(exactly) > 0
         found[finer] = sum(len(each.distances_m) for each in near)
         least_m = min(float(each.distances_m.min()) for each in near)

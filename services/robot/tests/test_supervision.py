@@ -87,7 +87,7 @@ def test_a_command_is_as_fresh_as_its_arrival_not_as_its_handling() -> None:
     assert accept(story.now, late, 120 * MS, POLICY)[1] == "late"
 
 
-def test_a_stale_command_after_refused_ones_is_told_as_refused() -> None:
+def test_a_stale_command_after_refused_ones_is_reported_as_refused() -> None:
     story = Story()
     story.engage()
     assert story.tick(50, refused=True) == "none"
@@ -160,7 +160,7 @@ def test_whoever_asks_stops_it_until_the_operator_lets_go_and_takes_hold_again()
     assert story.tick(201) == "none"
 
 
-def test_a_stop_that_was_asked_for_is_told_of_for_a_while_also_where_nobody_drives() -> None:
+def test_a_stop_that_was_asked_for_is_shown_for_a_while_also_where_nobody_drives() -> None:
     story = Story()
     story.engage()
     story.order(1, False)

@@ -149,7 +149,7 @@ def test_the_command_of_a_training_is_always_the_same() -> None:
 # --- what the process of a training tells ---------------------------------------------------------
 
 
-def told(
+def reported(
     made: Job, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> tuple[int, str, str]:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(made.model_dump_json().encode())))
@@ -172,7 +172,7 @@ FILES = {
 
 @pytest.mark.parametrize("content", FILES.values(), ids=FILES)
 @pytest.mark.parametrize("find_states", [False, True])
-def test_a_demonstration_that_is_none_is_told_without_a_word_of_it(
+def test_a_demonstration_that_is_none_is_reported_without_a_word_of_it(
     models: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -197,7 +197,7 @@ def test_labels_beside_a_recording_are_not_quoted(
     name: str,
 ) -> None:
     (models.parent / "takes" / "take.labels.csv").write_text(SECRET)
-    code, error, _ = told(job(models, demonstrations=(name,)), monkeypatch, capsys)
+    code, error, _ = reported(job(models, demonstrations=(name,)), monkeypatch, capsys)
     assert code == 2
     assert "secret" not in error
 
@@ -205,7 +205,7 @@ def test_labels_beside_a_recording_are_not_quoted(
 @pytest.mark.parametrize(
     "content", [SECRET, f"{SECRET}: 1\n", f"name: [{SECRET}", f"- {SECRET}\n", '"\\ud800"']
 )
-def test_a_task_that_is_none_is_told_without_a_word_of_it(
+def test_a_task_that_is_none_is_reported_without_a_word_of_it(
     models: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -213,7 +213,7 @@ def test_a_task_that_is_none_is_told_without_a_word_of_it(
 ) -> None:
     (models / "found.yaml").write_text(content)
     made = job(models, task="found.yaml")
-    code, error, whole = told(made, monkeypatch, capsys)
+    code, error, whole = reported(made, monkeypatch, capsys)
     assert code == 2
     assert error.startswith(str(models / "found.yaml"))
     assert "no task: `hmcs task check`" in error

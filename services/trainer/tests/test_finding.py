@@ -92,13 +92,13 @@ def takes(maker: Maker) -> list[str]:
 def test_changes_are_found_within_a_few_steps_of_the_true_ones(
     takes: list[str], tmp_path: Path
 ) -> None:
-    told: list[str] = []
-    train(LINES.name, takes, tmp_path / "m.hmcs", find_states=True, progress=told.append)
+    heard: list[str] = []
+    train(LINES.name, takes, tmp_path / "m.hmcs", find_states=True, progress=heard.append)
     for k, file in enumerate(takes, start=1):
         true = true_changes_s(shown(k), PERIOD_S)
         np.testing.assert_allclose(found_changes_s(Path(file)), true, atol=within_s(3))
-    assert any("4 states of" in line and "found in 3 demonstrations" in line for line in told)
-    assert any(line.startswith("take-1.mcap: s1 0.0–") for line in told)
+    assert any("4 states of" in line and "found in 3 demonstrations" in line for line in heard)
+    assert any(line.startswith("take-1.mcap: s1 0.0–") for line in heard)
 
 
 def test_performances_in_one_recording_are_found_at_their_own_times(
@@ -166,21 +166,21 @@ def test_nothing_is_written_beside_what_is_no_recording(tmp_path: Path) -> None:
         files.append(str(tmp_path / f"take-{seed}.csv"))
         write_csv(files[-1], shown(seed))
     before = [Path(file).read_bytes() for file in files]
-    told: list[str] = []
-    train(LINES.name, files, tmp_path / "m.hmcs", find_states=True, progress=told.append)
+    heard: list[str] = []
+    train(LINES.name, files, tmp_path / "m.hmcs", find_states=True, progress=heard.append)
     assert [Path(file).read_bytes() for file in files] == before
     assert not list(tmp_path.glob("*.labels.csv"))
-    assert f"{files[0]}: is no recording: labels are not written beside it" in told
+    assert f"{files[0]}: is no recording: labels are not written beside it" in heard
 
 
-def test_a_slip_of_the_hand_is_left_out_and_told(maker: Maker, tmp_path: Path) -> None:
+def test_a_slip_of_the_hand_is_left_out_and_reported(maker: Maker, tmp_path: Path) -> None:
     positions = shown(1).positions
     slip = np.repeat(positions[:1], 5, axis=0) + np.linspace(0, 1e-3, 5)[:, None]
     file = maker.write([*hand(slip), *hand(positions), *hand(shown(2).positions)])
-    told: list[str] = []
-    train(LINES.name, [str(file)], tmp_path / "m.hmcs", find_states=True, progress=told.append)
-    assert any("take.mcap#1: moves hardly at all from 0.0 s to 0.1 s" in line for line in told)
-    assert any("found in 2 demonstrations" in line for line in told)
+    heard: list[str] = []
+    train(LINES.name, [str(file)], tmp_path / "m.hmcs", find_states=True, progress=heard.append)
+    assert any("take.mcap#1: moves hardly at all from 0.0 s to 0.1 s" in line for line in heard)
+    assert any("found in 2 demonstrations" in line for line in heard)
 
 
 def still(count: int) -> NDArray[np.float64]:
@@ -211,17 +211,17 @@ def test_the_command_finds_states_too(
 
 
 def refused(files: list[str], tmp_path: Path) -> str:
-    with pytest.raises(UserError) as told:
+    with pytest.raises(UserError) as heard:
         train(LINES.name, files, tmp_path / "m.hmcs")
     assert not (tmp_path / "m.hmcs").exists()
-    return str(told.value)
+    return str(heard.value)
 
 
 def labeled(file: str, rows: str) -> None:
     labels_beside(Path(file)).write_text(f"begin_s,end_s,state\n{rows}")
 
 
-def test_a_label_that_is_no_state_is_told_with_its_recording_time_and_the_nearest(
+def test_a_label_that_is_no_state_is_reported_with_its_recording_time_and_the_nearest(
     takes: list[str], tmp_path: Path
 ) -> None:
     labeled(takes[1], "0.5,1.5,lift\n1.5,2.5,cary\n")
@@ -232,12 +232,14 @@ def test_a_label_that_is_no_state_is_told_with_its_recording_time_and_the_neares
     assert "states are lift, carry" in text
 
 
-def test_labels_over_one_another_are_told_with_their_line(takes: list[str], tmp_path: Path) -> None:
+def test_labels_over_one_another_are_reported_with_their_line(
+    takes: list[str], tmp_path: Path
+) -> None:
     labeled(takes[0], "0.5,1.5,lift\n1.0,2.5,carry\n")
     assert "take-1.labels.csv:3: begins before the label above it" in refused(takes[:1], tmp_path)
 
 
-def test_a_recording_without_labels_is_told_three_remedies(
+def test_a_recording_without_labels_is_refused_with_three_remedies(
     takes: list[str], tmp_path: Path
 ) -> None:
     text = refused(takes[:1], tmp_path)
@@ -246,13 +248,13 @@ def test_a_recording_without_labels_is_told_three_remedies(
         assert remedy in text
 
 
-def test_labels_where_the_hand_did_not_move_are_told(takes: list[str], tmp_path: Path) -> None:
+def test_labels_where_the_hand_did_not_move_are_reported(takes: list[str], tmp_path: Path) -> None:
     labeled(takes[0], "0,0.005,lift\n")
     assert "labels are where the hand did not move" in refused(takes[:1], tmp_path)
 
 
 @pytest.mark.parametrize("find_states", [False, True])
-def test_a_recording_without_a_hand_that_held_on_is_told(
+def test_a_recording_without_a_hand_that_held_on_is_reported(
     maker: Maker, tmp_path: Path, find_states: bool
 ) -> None:
     loose = (KEYS.motion, Motion(position=np.zeros(3), velocity=np.zeros(3), dead_man=False))
@@ -261,7 +263,7 @@ def test_a_recording_without_a_hand_that_held_on_is_told(
         train(LINES.name, [file], tmp_path / "m.hmcs", find_states=find_states)
 
 
-def test_a_recording_of_another_version_of_the_contract_is_told(
+def test_a_recording_of_another_version_of_the_contract_is_reported(
     maker: Maker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = str(maker.write(hand(shown(1).positions)))

@@ -29,7 +29,7 @@ def learned(files: list[str], tmp_path: Path, **more: bool) -> list[str]:
     return said
 
 
-def test_files_of_one_name_are_told_apart_and_learned_from_each(
+def test_files_of_one_name_are_distinguished_and_learned_from_each(
     files: list[str], tmp_path: Path
 ) -> None:
     write_csv(files[1], changed(shown(1), slice(10, 12), np.array([0, 0, 0.4])))
@@ -51,7 +51,7 @@ def test_implausible_demonstrations_are_learned_from_on_request(
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_the_same_file_twice_counts_once_and_is_told(
+def test_the_same_file_twice_counts_once_and_is_reported(
     files: list[str], tmp_path: Path, copied: bool
 ) -> None:
     again = files[0]

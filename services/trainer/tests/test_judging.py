@@ -109,13 +109,13 @@ def test_training_writes_a_page_that_needs_nothing_else(tmp_path: Path) -> None:
     for seed in range(1, 4):
         files.append(str(tmp_path / f"take-{seed}.csv"))
         write_csv(files[-1], shown(seed))
-    told: list[str] = []
+    reported: list[str] = []
     train(
         LINES.name,
         files,
         tmp_path / "m.hmcs",
         report=tmp_path / "m.html",
-        progress=told.append,
+        progress=reported.append,
     )
     page = (tmp_path / "m.html").read_text()
     assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "")
@@ -123,11 +123,11 @@ def test_training_writes_a_page_that_needs_nothing_else(tmp_path: Path) -> None:
     assert page.count("<svg") == 2
     for picture in page.split("<svg")[1:]:
         ElementTree.fromstring("<svg" + picture.split("</svg>")[0] + "</svg>")
-    assert any("steps right" in line for line in told)
+    assert any("steps right" in line for line in reported)
     assert sorted(f.name for f in tmp_path.iterdir() if "m." in f.name) == ["m.hmcs", "m.html"]
 
 
-def test_what_cannot_be_learned_from_is_told_and_nothing_is_written(tmp_path: Path) -> None:
+def test_what_cannot_be_learned_from_is_reported_and_nothing_is_written(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", shown(1))
     backwards = shown(2)
     write_csv(tmp_path / "b.csv", backwards._replace(positions=-backwards.positions))

@@ -12,7 +12,7 @@ from hmcs.motion.lasa import drawings, read_drawing, shapes
 from hmcs.task import find_task, load_task, shipped_tasks
 from hmcs_trainer.plausibility import Finding, implausible
 from hmcs_trainer.validation import findings
-from support.carried import TASK, changed, serious, shown, told, turned
+from support.carried import TASK, changed, serious, shown, texts, turned
 
 # --- no false alarms ------------------------------------------------------------------------------
 
@@ -122,7 +122,7 @@ def test_a_jump_where_nothing_is_labeled_does_no_harm() -> None:
     assert not serious(hand._replace(states=states), shown(1))
 
 
-def test_where_the_tracker_jumps_disagreement_is_not_told_as_well() -> None:
+def test_where_the_tracker_jumps_disagreement_is_not_reported_as_well() -> None:
     jumping = changed(shown(), slice(300, None), np.array([0.0, 0.0, 2.0]))
     (text,) = serious(jumping, shown(1), shown(2))
     assert "jumps" in text
@@ -140,7 +140,7 @@ def test_the_sign_of_a_quaternion_is_no_turn() -> None:
     hand = turned(shown(), np.linspace(0, 1, 600))
     assert hand.orientations is not None
     hand.orientations[::2] *= -1
-    assert not told(hand, hand._replace(name="other", positions=shown(1).positions))
+    assert not texts(hand, hand._replace(name="other", positions=shown(1).positions))
 
 
 # --- training -------------------------------------------------------------------------------------

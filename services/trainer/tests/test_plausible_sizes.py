@@ -6,7 +6,7 @@ import pytest
 
 from hmcs.motion.demonstrations import Demonstration
 from hmcs_trainer.validation import findings
-from support.carried import TASK, serious, shown, told
+from support.carried import TASK, serious, shown, texts
 
 # --- units ----------------------------------------------------------------------------------------
 
@@ -33,37 +33,37 @@ def test_one_file_ten_times_as_large_is_refused_though_it_fits_the_workspace() -
     wide = TASK.model_copy(update={"workspace": TASK.workspace.model_validate(box)})
     one = shown(1, noise_m=0.0)
     given_ = [shown(0), one._replace(positions=one.positions * 12.0), shown(2)]
-    texts = [finding.text for finding in findings(wide, given_) if finding.serious]
-    assert texts
-    assert all(text.startswith("take-1.csv") and "units" in text for text in texts)
+    found = [finding.text for finding in findings(wide, given_) if finding.serious]
+    assert found
+    assert all(text.startswith("take-1.csv") and "units" in text for text in found)
 
 
-def test_of_two_that_differ_much_in_size_both_are_told() -> None:
+def test_of_two_that_differ_much_in_size_both_are_reported() -> None:
     one = shown(1)
     half = one.positions[0] + 0.4 * (one.positions - one.positions[0])
-    texts = told(shown(0), one._replace(positions=half))
-    assert sum("leave it out, if it was not meant" in text for text in texts) == 6
+    found = texts(shown(0), one._replace(positions=half))
+    assert sum("leave it out, if it was not meant" in text for text in found) == 6
     assert not serious(shown(0), one._replace(positions=half))
 
 
 @pytest.mark.parametrize("size", [1e3, 1e6, 1e9])
-def test_times_in_other_units_are_told(size: float) -> None:
+def test_times_in_other_units_are_reported(size: float) -> None:
     hand = shown()
-    (text,) = (t for t in told(hand._replace(time_s=hand.time_s * size), shown(1)))
+    (text,) = (t for t in texts(hand._replace(time_s=hand.time_s * size), shown(1)))
     assert "take-0.csv: it lasts" in text
     assert "milliseconds or nanoseconds" in text
 
 
-def test_times_that_are_far_too_short_are_told() -> None:
+def test_times_that_are_far_too_short_are_reported() -> None:
     hand = shown()
-    texts = told(hand._replace(time_s=hand.time_s / 60), shown(1))
-    assert any("see that its times are seconds" in text for text in texts)
+    found = texts(hand._replace(time_s=hand.time_s / 60), shown(1))
+    assert any("see that its times are seconds" in text for text in found)
 
 
 # --- holes, and ways out of the workspace ---------------------------------------------------------
 
 
-def test_a_hole_in_the_samples_is_told_with_its_times() -> None:
+def test_a_hole_in_the_samples_is_reported_with_its_times() -> None:
     hand = shown()
     kept = (hand.time_s < 2.5) | (hand.time_s >= 4.5)
     hole = Demonstration(
@@ -72,33 +72,33 @@ def test_a_hole_in_the_samples_is_told_with_its_times() -> None:
         hand.positions[kept],
         tuple(state for state, there in zip(hand.states, kept, strict=True) if there),
     )
-    texts = told(hole, shown(1))
-    assert any("no sample from 2.49 s to 4.50 s, and the hand moved 0.2" in t for t in texts)
+    found = texts(hole, shown(1))
+    assert any("no sample from 2.49 s to 4.50 s, and the hand moved 0.2" in t for t in found)
 
 
 def test_a_pause_without_samples_is_no_hole() -> None:
     hand = shown()
     later = hand.time_s + 5.0 * (hand.time_s >= 2.5)
-    assert not told(hand._replace(time_s=later), shown(1))
+    assert not texts(hand._replace(time_s=later), shown(1))
 
 
-def test_a_way_that_leaves_the_workspace_is_told_wherever_it_was_recorded() -> None:
+def test_a_way_that_leaves_the_workspace_is_reported_wherever_it_was_recorded() -> None:
     far = shown().positions[0] + 2.0 * (shown().positions - shown().positions[0])
     for moved_m in (0.0, 5.0):
-        texts = told(shown()._replace(positions=far + moved_m))
-        assert any("leaves the workspace by 0.1" in text and "along y" in text for text in texts)
+        found = texts(shown()._replace(positions=far + moved_m))
+        assert any("leaves the workspace by 0.1" in text and "along y" in text for text in found)
 
 
-def test_a_way_longer_than_the_workspace_is_told() -> None:
+def test_a_way_longer_than_the_workspace_is_reported() -> None:
     positions = shown().positions[0] + 3.5 * (shown().positions - shown().positions[0])
-    (text, *_) = told(shown()._replace(positions=positions))
+    (text, *_) = texts(shown()._replace(positions=positions))
     assert "the robot cannot make it" in text
 
 
 # --- long gestemes --------------------------------------------------------------------------------
 
 
-def test_a_gesteme_too_long_to_be_remembered_is_told_with_a_dead_zone_that_helps() -> None:
+def test_a_gesteme_too_long_to_be_remembered_is_reported_with_a_dead_zone_that_helps() -> None:
     fine = TASK.model_copy(update={"dead_zone_m": 1e-4})
     hands = [shown(seed, 2000.0, noise_m=0.0) for seed in range(2)]
     texts = [finding.text for finding in findings(fine, hands)]

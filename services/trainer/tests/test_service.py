@@ -31,10 +31,10 @@ class Bench:
         self.stack, self.folder = stack, folder
         self.takes = folder.parent / "takes"
         self.takes.mkdir()
-        self.told: list[TrainingProgress] = []
+        self.reported: list[TrainingProgress] = []
         watcher = stack.open_bus("observer", "one")
         watcher.subscribe(
-            TrainingProgress, watcher.keys.training, lambda got: self.told.append(got.body)
+            TrainingProgress, watcher.keys.training, lambda got: self.reported.append(got.body)
         )
         bus = stack.open_bus("trainer", "here")
         settings = TrainerSettings(folder=folder, sources=(self.takes,))
@@ -43,7 +43,7 @@ class Bench:
 
     def until(self, stage: str) -> TrainingProgress:
         def reached() -> TrainingProgress | None:
-            return next((told for told in self.told if told.stage == stage), None)
+            return next((reported for reported in self.reported if reported.stage == stage), None)
 
         found = self.stack.until(reached, within_s=120.0)
         assert isinstance(found, TrainingProgress)
@@ -58,16 +58,18 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         made.trainer.close()
 
 
-def test_a_model_and_its_page_are_made_and_progress_is_told(bench: Bench) -> None:
+def test_a_model_and_its_page_are_made_and_progress_is_reported(bench: Bench) -> None:
     assert "training mine" in bench.trainer._train(ASKED).detail
     with pytest.raises(RequestRefusedError, match="mine is being trained: wait"):
         bench.trainer._train(ASKED)
     done = bench.until("done")
     assert load_model(done.path).name == "mine"
     assert Path(done.report).is_file()
-    shares = [told.share for told in bench.told]
+    shares = [reported.share for reported in bench.reported]
     assert shares == sorted(shares)
-    assert {"checking", "learning", "judging", "done"} == {told.stage for told in bench.told}
+    assert {"checking", "learning", "judging", "done"} == {
+        reported.stage for reported in bench.reported
+    }
     assert "steps right" in done.detail
     assert "mine" in bench.trainer.health()[1]
 
@@ -77,7 +79,7 @@ def test_a_training_that_cannot_succeed_says_why_and_the_next_one_may(bench: Ben
     bench.trainer._train(ASKED.model_copy(update={"demonstrations": ("empty.csv",)}))
     failed = bench.until("failed")
     assert "empty.csv: cannot be read: `hmcs task check`" in failed.detail
-    assert not any("secret" in told.detail for told in bench.told)
+    assert not any("secret" in reported.detail for reported in bench.reported)
     assert list(bench.folder.iterdir()) == []
     bench.trainer._train(ASKED)
     bench.until("learning")
@@ -130,7 +132,7 @@ def test_states_are_found_when_asked_for(bench: Bench) -> None:
     assert load_task(bench.folder / "found.yaml") == load_model(done.path).task
 
 
-def test_a_hidden_file_is_neither_read_nor_told_to_be_there(bench: Bench, tmp_path: Path) -> None:
+def test_a_hidden_file_is_neither_read_nor_asked_to_be_there(bench: Bench, tmp_path: Path) -> None:
     secret = tmp_path / "secret.csv"
     secret.write_text("root:x:0:0:root:/root:/bin/bash\n")
     (bench.takes / "link.csv").symlink_to(secret)
@@ -147,7 +149,7 @@ def test_a_hidden_file_is_neither_read_nor_told_to_be_there(bench: Bench, tmp_pa
         reasons.append(str(caught.value).replace(repr(name), "it"))
     assert len(set(reasons)) == 1
     assert "is no file in the trainer's folders" in reasons[0]
-    assert bench.told == []
+    assert bench.reported == []
 
 
 def test_a_training_that_takes_too_long_is_given_up_and_the_next_one_may(
@@ -165,7 +167,7 @@ def test_a_training_that_takes_too_long_is_given_up_and_the_next_one_may(
     bench.until("learning")
 
 
-def test_a_training_whose_process_dies_is_told_and_quotes_nothing(
+def test_a_training_whose_process_dies_is_reported_and_quotes_nothing(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dies = (sys.executable, "-c", "raise SystemExit('root:x:0:0')")
@@ -185,7 +187,7 @@ def test_what_strangers_tell_takes_no_memory_and_is_forgotten(
         stranger.publisher(TrainingProgress, stranger.keys.training).put(
             TrainingProgress(model="mine", stage="learning", detail="", share=0.0)
         )
-    bench.stack.until(lambda: len(bench.told) == 4)
+    bench.stack.until(lambda: len(bench.reported) == 4)
     bench.stack.until(lambda: "stranger-3" in bench.trainer._elsewhere)
     assert len(bench.trainer._elsewhere) <= 2
     with pytest.raises(RequestRefusedError, match="by trainer stranger"):

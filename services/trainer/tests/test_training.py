@@ -122,7 +122,7 @@ def test_a_mistake_ends_with_code_2_and_one_clear_line(arguments, message, tmp_p
         "unknown_rise=1e308",
     ],
 )
-def test_settings_that_make_no_model_are_told_and_nothing_is_written(setting, tmp_path):
+def test_settings_that_make_no_model_are_reported_and_nothing_is_written(setting, tmp_path):
     name, _, value = setting.partition("=")
     with pytest.raises(UserError), np.errstate(all="ignore"):
         train(TASK, TWO_OF_EACH, tmp_path / "m.hmcs", settings={name: value})

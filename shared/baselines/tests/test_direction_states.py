@@ -107,7 +107,7 @@ def test_a_filter_asks_for_directions_not_for_lengths() -> None:
     assert np.isfinite(still).all()
 
 
-def test_changes_are_told_soon_and_surely() -> None:
+def test_changes_are_reported_soon_and_surely() -> None:
     late, false, steps = [], 0, 0
     known = learned(DEFAULT)
     where = (NOMINAL @ known.directions.T).argmax(axis=1)

@@ -26,7 +26,7 @@ def taught(discovery: str = "recurring-chords", estimator: str = "gaussian") -> 
 
 @pytest.mark.parametrize("discovery", ["chords", "recurring-chords", "kmeans-cusum", "labels"])
 @pytest.mark.parametrize("estimator", ["gaussian", "svm"])
-def test_task_states_are_told_by_directions(discovery: str, estimator: str) -> None:
+def test_task_states_are_recognized_by_directions(discovery: str, estimator: str) -> None:
     model, right, count = taught(discovery, estimator), 0, 0
     for seed in range(60, 63):
         recognizer, labeled = recognizer_of(model), labeled_steps(model.task, performed(seed))

@@ -42,7 +42,7 @@ def learned_wrenches() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return rows, categories
 
 
-def test_categories_are_told_apart_by_scikit_learns_machines() -> None:
+def test_categories_are_distinguished_by_scikit_learns_machines() -> None:
     sharp = TEXT._replace(estimator=TEXT.estimator._replace(least_ratio=0.0))
     model, steps = taught(sharp), steps_performed(30)
     rows, categories = learned_wrenches()
@@ -101,10 +101,10 @@ def test_components_that_are_not_looked_at_do_not_matter() -> None:
 def test_without_force_the_direction_of_motion_takes_its_place() -> None:
     shown = [performed(seed) for seed in range(3)]
     shown[1] = shown[1]._replace(wrenches=None)
-    told: list[str] = []
-    model = learn(lesson_task(), shown, recognizer="force-svm", progress=told.append)
+    reported: list[str] = []
+    model = learn(lesson_task(), shown, recognizer="force-svm", progress=reported.append)
     assert model.knowledge.observed == "direction"
-    assert any("directions of motion" in line for line in told)
+    assert any("directions of motion" in line for line in reported)
     recognizer = recognizer_of(model)
     labeled = labeled_steps(model.task, performed(35))
     believed = [int(recognizer.step(step).belief.states.argmax()) for step in labeled.steps]
@@ -166,7 +166,7 @@ def test_knowledge_that_does_not_fit_is_refused() -> None:
             check(spoiled, lesson_task())
 
 
-def test_sub_tasks_are_told_in_the_round() -> None:
+def test_sub_tasks_are_recognized_in_the_round() -> None:
     recognizer, steps = recognizer_of(taught()), steps_performed(37, ROUND * 2)
     starts = [k for k, step in enumerate(steps) if step.mark]
     true = np.repeat(np.arange(8) % 4, np.diff([*starts, len(steps)]))

@@ -39,7 +39,9 @@ def waved(seed: int) -> Demonstration:
     return Demonstration(f"waves-{seed}", np.arange(97) / 10.0, positions, tuple(labels))
 
 
-def test_gestemes_are_told_apart_by_how_fast_they_turn_where_directions_alone_are_alike() -> None:
+def test_gestemes_are_distinguished_by_how_fast_they_turn_where_directions_alone_are_alike() -> (
+    None
+):
     settings = FOURIER.settings()._replace(observing=ObservationSettings(symbols=8))
     demonstrations = [waved(seed) for seed in range(4)]
     model = learn(waves_task(), demonstrations, settings, recognizer="fourier")

@@ -147,7 +147,7 @@ def test_a_state_never_demonstrated_looks_like_its_gesteme() -> None:
     np.testing.assert_array_equal(model.knowledge.means[3], model.knowledge.means[1])
 
 
-def test_the_gesteme_performed_is_told_where_a_state_has_several() -> None:
+def test_the_gesteme_performed_is_reported_where_a_state_has_several() -> None:
     fields = lesson_task().model_dump()
     fields["states"] = [
         {"name": "move", "gestemes": ["reach", "lift"], "next": ["turn"]},

@@ -107,7 +107,7 @@ def test_what_the_task_hmm_expects_is_counted_from_the_winners_of_the_demonstrat
     )
 
 
-def test_states_that_share_a_gesteme_are_told_apart_by_the_order() -> None:
+def test_states_that_share_a_gesteme_are_distinguished_by_the_order() -> None:
     recognizer = recognizer_of(taught(GIVEN))
     beliefs = np.array([recognizer.step(step).belief.states for step in steps_performed(60)])
     true = labeled_steps(lesson_task(), performed(60)).states

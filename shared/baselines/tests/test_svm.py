@@ -63,7 +63,7 @@ def test_bayes_inversion_divides_by_how_often_a_state_occurs():
     np.testing.assert_allclose(ratio, state_probabilities(machines, samples), rtol=1e-12)
 
 
-def test_separate_directions_are_told_apart():
+def test_separate_directions_are_distinguished():
     samples, labels = directions(4)
     fresh, truth = directions(5)
     probable = state_probabilities(fit_machines(samples, labels), fresh).argmax(axis=1)
@@ -99,7 +99,7 @@ def test_settings_that_are_not_positive_are_refused():
         fit_machines(np.eye(2), [0, 1], SvmSettings(rbf_width=0.0))
 
 
-def test_without_scikit_learn_the_user_is_told_what_to_install(monkeypatch):
+def test_without_scikit_learn_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.svm", None)
     with pytest.raises(LearningMissingError, match=r"hmcs-baselines\[learning\]"):
         fit_machines(np.eye(2), [0, 1])

@@ -77,7 +77,7 @@ def silent() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("router", ["tcp/192.0.2.1:7447", "tcp/router:7447"])
-def test_a_direct_process_that_others_would_not_hear_is_told_so(router) -> None:
+def test_a_direct_process_that_others_would_not_hear_is_warned(router) -> None:
     settings = BusSettings(router=router, direct=True)
     with pytest.raises(UserError, match=r"do not reach this one.*--open-to-network"):
         connect(settings, LOG, lambda: False)
@@ -187,7 +187,7 @@ def test_an_interrupt_while_waiting_gives_the_attempt_up(router, monkeypatch, un
     until(lambda: opened and opened[0].is_closed())
 
 
-def test_what_goes_wrong_in_an_attempt_is_told(monkeypatch, router) -> None:
+def test_what_goes_wrong_in_an_attempt_is_reported(monkeypatch, router) -> None:
     def fail(_: zenoh.Config) -> zenoh.Session:
         raise MemoryError("no room")
 

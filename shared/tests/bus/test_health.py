@@ -80,7 +80,7 @@ def test_all_must_be_well_and_say_so(asked) -> None:
     assert asked({"a": said, "b": said}) == (0, "")
 
 
-def test_each_that_is_ill_is_told(asked) -> None:
+def test_each_that_is_ill_is_reported(asked) -> None:
     code, out = asked({"a": said, "b": lambda: said(False, "no motion"), "c": lambda: said(False)})
     assert (code, out) == (1, "thing: b: no motion; c: running\n")
 
@@ -109,7 +109,7 @@ def test_what_a_stranger_says_of_itself_is_shown_without_control_characters(aske
     assert out == "thing: a: \\x1b[2J\\u202egone\n"
 
 
-def test_where_nobody_is_there_that_is_told(asked) -> None:
+def test_where_nobody_is_there_that_is_reported(asked) -> None:
     code, out = asked({})
     assert code == 1
     assert "nobody answered on" in out

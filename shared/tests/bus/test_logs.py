@@ -99,8 +99,8 @@ def test_a_fact_from_elsewhere_makes_no_endless_line(stream) -> None:
 @given(st.floats(0, 4e9))
 def test_the_time_of_a_line_is_the_time_of_its_event(seconds) -> None:
     record = logging.makeLogRecord({"created": seconds, "msg": "x"})
-    told = json.loads(JsonLines("p").format(record))["time"]
-    read = datetime.strptime(told, "%Y-%m-%dT%H:%M:%S.%fZ").replace(tzinfo=UTC).timestamp()
+    reported = json.loads(JsonLines("p").format(record))["time"]
+    read = datetime.strptime(reported, "%Y-%m-%dT%H:%M:%S.%fZ").replace(tzinfo=UTC).timestamp()
     assert abs(read - seconds) < 1e-6
 
 
@@ -119,7 +119,7 @@ def test_what_comes_of_different_keys_is_of_different_kinds(caplog) -> None:
     assert len(caplog.records) == 2
 
 
-def test_kinds_that_are_made_up_are_bounded_and_what_was_left_out_is_told(caplog) -> None:
+def test_kinds_that_are_made_up_are_bounded_and_what_was_left_out_is_reported(caplog) -> None:
     now_s = [0.0]
     seldom = RateLimitedLog(logging.getLogger("seldom"), period_s=5.0, clock=lambda: now_s[0])
     names = ["".join(word) for word in itertools.product("abcdefghij", repeat=3)]
@@ -135,11 +135,11 @@ def test_kinds_that_are_made_up_are_bounded_and_what_was_left_out_is_told(caplog
     assert len(seldom._last_s) + len(seldom._left_out) <= 2 * MOST_KINDS
     now_s[0] = 10.0
     seldom.warning("another", "refused")
-    told = sum(
+    reported = sum(
         getattr(record, fact, 0)
         for record in caplog.records
         for fact in ("left_out", "others_left_out")
     )
     # Of each event a line, or a count in a later one; those of kinds still followed may wait.
     waiting = sum(seldom._left_out.values())
-    assert len(caplog.records) + told + waiting == 3 * len(names) + 1
+    assert len(caplog.records) + reported + waiting == 3 * len(names) + 1

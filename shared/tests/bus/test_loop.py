@@ -27,7 +27,7 @@ class Process:
         self.stopped = True
 
 
-def test_who_is_told_to_stop_handles_nothing_that_came_after() -> None:
+def test_who_is_asked_to_stop_handles_nothing_that_came_after() -> None:
     process = Process()
     process.put("first")
     process.mailbox.put(process.stop)

@@ -35,7 +35,7 @@ def test_those_already_there_come_first_and_a_withdrawn_one_goes(join) -> None:
     assert seen == [(key, True), (key, False)]
 
 
-def test_a_token_that_is_only_confirmed_is_not_told_again(join, monkeypatch) -> None:
+def test_a_token_that_is_only_confirmed_is_not_reported_again(join, monkeypatch) -> None:
     observer = join("observer")
     key = observer.keys.presence("robot", "r")
     seen: list[tuple[str, bool]] = []

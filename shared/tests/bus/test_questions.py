@@ -186,7 +186,7 @@ def test_a_process_that_asks_everybody_does_not_wait_for_itself(served, join, un
     assert [answer.body.detail for answer in ask(one, "*", until)] == ["two"]
 
 
-def test_asking_ends_when_the_process_is_told_to_stop(router, join) -> None:
+def test_asking_ends_when_the_process_is_asked_to_stop(router, join) -> None:
     hung = join("robot", "a")
     hung.answer("activate", ActivateRecognizer, lambda _: Done(detail=""))
     with Bus.open(

@@ -32,13 +32,15 @@ def test_a_second_router_process_ends_with_code_2_and_one_line(router, capsys) -
 
 
 @pytest.mark.parametrize("endpoint", ["7447", "localhost:7447", "tcp/", ""])
-def test_what_is_no_endpoint_is_told(endpoint) -> None:
+def test_what_is_no_endpoint_is_reported(endpoint) -> None:
     with pytest.raises(RouterError, match="no endpoint"):
         open_router(endpoint)
 
 
 @pytest.mark.parametrize("content", ["{a:", "{listen: 7}", '{mode: "star"}', None])
-def test_a_file_that_is_no_configuration_is_told_by_name(tmp_path, content, free_endpoint) -> None:
+def test_a_file_that_is_no_configuration_is_reported_by_name(
+    tmp_path, content, free_endpoint
+) -> None:
     path = tmp_path / "router.json5"
     if content is not None:
         path.write_text(content)

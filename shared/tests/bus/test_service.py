@@ -110,7 +110,7 @@ def test_a_handler_that_fails_is_logged_and_the_loop_goes_on_unhealthy(
     assert "RuntimeError: boom" in capsys.readouterr().out
 
 
-def test_a_mistake_of_the_user_met_while_it_runs_is_a_failed_handler_told_in_one_line(
+def test_a_mistake_of_the_user_met_while_it_runs_is_a_failed_handler_reported_in_one_line(
     probe, join, until
 ) -> None:
     bus = join()
@@ -309,7 +309,7 @@ def test_a_service_that_cannot_start_unexpectedly_is_code_1_with_a_traceback(
     assert "RuntimeError: boom" in capsys.readouterr().err
 
 
-def test_nobody_healthy_is_told_in_one_line(router, capsys) -> None:
+def test_nobody_healthy_is_reported_in_one_line(router, capsys) -> None:
     began_s = time.monotonic()
     assert health.main(["--service", "nobody", "--router", router]) == 1
     assert time.monotonic() - began_s < 5
@@ -318,7 +318,7 @@ def test_nobody_healthy_is_told_in_one_line(router, capsys) -> None:
     assert len(out.splitlines()) == 1
 
 
-def test_an_unhealthy_service_is_told_with_its_reason(quiet, ask_quiet, capsys) -> None:
+def test_an_unhealthy_service_is_reported_with_its_reason(quiet, ask_quiet, capsys) -> None:
     assert not ask_quiet("health", Health).healthy
     assert health.main(["--service", "quiet", "--router", quiet, "--cell", "test"]) == 1
     assert capsys.readouterr().out == "quiet: q: waiting for a model\n"

@@ -117,7 +117,7 @@ def test_two_subscriptions_of_one_bus_both_get_every_message(pair) -> None:
     assert not receiver.counters.lost
 
 
-def test_arrival_is_told_by_the_local_monotonic_clock(pair) -> None:
+def test_arrival_is_reported_by_the_local_monotonic_clock(pair) -> None:
     sender, receiver, publisher = pair
     got = []
     receiver.subscribe(Step, receiver.keys.step, got.append)
@@ -203,9 +203,9 @@ def test_malformed_messages_are_refused_counted_logged_and_the_loop_goes_on(raw,
     assert receiver.counters.refused == {"step": 4}
     # Number 1 did arrive.
     assert not receiver.counters.lost
-    told = [r for r in caplog.records if r.getMessage() == "message refused"]
-    assert len(told) == 1
-    assert "not a msgpack message" in told[0].reason
+    reported = [r for r in caplog.records if r.getMessage() == "message refused"]
+    assert len(reported) == 1
+    assert "not a msgpack message" in reported[0].reason
 
 
 def test_an_exception_of_a_handler_leaves_the_pump_and_the_rest_stays_pending(pair, until) -> None:
@@ -290,7 +290,7 @@ def test_no_router_within_the_time_set_is_a_clear_error(free_endpoint) -> None:
         Bus.open(settings, "tester", "a")
 
 
-def test_waiting_for_a_router_says_so_and_ends_when_told(free_endpoint, caplog) -> None:
+def test_waiting_for_a_router_says_so_and_ends_when_asked(free_endpoint, caplog) -> None:
     def stopping() -> bool:
         return any("waiting for a router" in record.getMessage() for record in caplog.records)
 
@@ -392,5 +392,5 @@ def test_a_listener_gets_everything_in_order_as_it_came(pair) -> None:
     receive(listener, got, 100)
     assert sorted({arrival.key for arrival in got}) == [sender.keys.motion, sender.keys.step]
     of_motion = [arrival for arrival in got if arrival.key == sender.keys.motion]
-    told = [decode(arrival.payload, Motion)[1] for arrival in of_motion]
-    assert [body.position[0] for body in told] == list(range(50))
+    reported = [decode(arrival.payload, Motion)[1] for arrival in of_motion]
+    assert [body.position[0] for body in reported] == list(range(50))

@@ -86,7 +86,7 @@ def test_what_is_printed_gives_the_same_settings_as_a_file(file, dead_zone_m, ge
 
 
 @pytest.mark.parametrize(
-    ("argv", "told"),
+    ("argv", "reported"),
     [
         (["--dead-zone", "1"], "unrecognized arguments: --dead-zone 1.*--dead-zone-m"),
         (["--dead-zone-m"], "--dead-zone-m: expected"),
@@ -101,13 +101,13 @@ def test_what_is_printed_gives_the_same_settings_as_a_file(file, dead_zone_m, ge
         (["--settings", "no-such-file.yaml"], "no-such-file.yaml: No such file"),
     ],
 )
-def test_a_mistake_on_the_command_line_is_told(argv, told) -> None:
-    with pytest.raises(SettingsError, match=f"(?s){told}"):
+def test_a_mistake_on_the_command_line_is_reported(argv, reported) -> None:
+    with pytest.raises(SettingsError, match=f"(?s){reported}"):
         load(*argv)
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reported"),
     [
         ("dead_zone: 1", r"probe.yaml: unknown setting dead_zone \(valid ones: .*dead_zone_m"),
         ("dead_zone_m: wide", "probe.yaml: dead_zone_m: .*number"),
@@ -117,22 +117,22 @@ def test_a_mistake_on_the_command_line_is_told(argv, told) -> None:
         ("1: 2", "probe.yaml: unknown setting 1"),
     ],
 )
-def test_a_mistake_in_the_file_is_told_with_its_name(file, content, told) -> None:
-    with pytest.raises(SettingsError, match=told):
+def test_a_mistake_in_the_file_is_reported_with_its_name(file, content, reported) -> None:
+    with pytest.raises(SettingsError, match=reported):
         load("--settings", file(content))
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
+    ("name", "value", "reported"),
     [
         ("DEAD_ZONE_M", "wide", "environment: dead_zone_m"),
         ("GESTEMES", "line,arc", "environment.*gestemes.*JSON"),
         ("CELL", "a/b", "environment: cell.*cannot be part of a key"),
     ],
 )
-def test_a_mistake_in_the_environment_is_told(monkeypatch, name, value, told) -> None:
+def test_a_mistake_in_the_environment_is_reported(monkeypatch, name, value, reported) -> None:
     monkeypatch.setenv(f"HMCS_{name}", value)
-    with pytest.raises(SettingsError, match=told):
+    with pytest.raises(SettingsError, match=reported):
         load()
 
 

@@ -91,24 +91,24 @@ class Listener:
     """A feed on a fake bus, and what it handed on: ("restart", index) and ("step", index)."""
 
     def __init__(self, bus: FakeBus, memory_steps: int = 5) -> None:
-        self.told: list[tuple[str, int]] = []
+        self.reported: list[tuple[str, int]] = []
         self.clocks: list[str] = []
         self.feed = StepFeed(
             bus,  # type: ignore[arg-type]
             logging.getLogger("test"),
             lambda fed: self._on_step(fed.step.index, fed.clock),
-            lambda index: self.told.append(("restart", index)),
+            lambda index: self.reported.append(("restart", index)),
             memory_steps=memory_steps,
         )
         self.feed.begin()
 
     def _on_step(self, index: int, clock: str) -> None:
-        self.told.append(("step", index))
+        self.reported.append(("step", index))
         self.clocks.append(clock)
 
     @property
     def steps(self) -> list[int]:
-        return [index for kind, index in self.told if kind == "step"]
+        return [index for kind, index in self.reported if kind == "step"]
 
 
 def test_who_is_there_from_the_beginning_gets_every_step_after_one_start() -> None:
@@ -116,14 +116,14 @@ def test_who_is_there_from_the_beginning_gets_every_step_after_one_start() -> No
     listener = Listener(bus)
     for index in range(4):
         bus.hear(index)
-    assert listener.told == [("restart", 0), *(("step", k) for k in range(4))]
+    assert listener.reported == [("restart", 0), *(("step", k) for k in range(4))]
     assert not bus.refused
 
 
 def test_who_comes_late_is_given_the_last_steps_first_and_none_of_them_twice() -> None:
     bus = FakeBus(kept=range(20))
     listener = Listener(bus, memory_steps=5)
-    assert listener.told == [("restart", 15), *(("step", k) for k in range(15, 20))]
+    assert listener.reported == [("restart", 15), *(("step", k) for k in range(15, 20))]
     for index in (18, 19, 20, 21):
         bus.hear(index)
     assert listener.steps == list(range(15, 22))
@@ -136,7 +136,7 @@ def test_missed_steps_are_fetched_before_it_goes_on() -> None:
     bus.hear(0)
     bus.kept = range(9)
     bus.hear(8)
-    assert listener.told == [("restart", 0), *(("step", k) for k in range(9))]
+    assert listener.reported == [("restart", 0), *(("step", k) for k in range(9))]
     assert (bus.questions[-1].count, bus.questions[-1].before) == (7, 8)
 
 
@@ -146,7 +146,7 @@ def test_a_gap_that_cannot_be_filled_is_a_new_beginning() -> None:
     bus.hear(0)
     bus.hear(5)
     bus.hear(6)
-    assert listener.told[-3:] == [("restart", 5), ("step", 5), ("step", 6)]
+    assert listener.reported[-3:] == [("restart", 5), ("step", 5), ("step", 6)]
 
 
 def test_a_gap_that_can_be_filled_in_part_begins_anew_with_that_part() -> None:
@@ -155,7 +155,7 @@ def test_a_gap_that_can_be_filled_in_part_begins_anew_with_that_part() -> None:
     bus.hear(0)
     bus.kept = range(6, 9)
     bus.hear(9)
-    assert listener.told[-5:] == [("restart", 6), *(("step", k) for k in range(6, 10))]
+    assert listener.reported[-5:] == [("restart", 6), *(("step", k) for k in range(6, 10))]
 
 
 @pytest.mark.parametrize("again", [0, 2, 3])
@@ -178,7 +178,7 @@ def test_an_input_device_that_starts_anew_starts_the_listener_anew() -> None:
     bus.boot = "boot-2"
     bus.wait(TAKEOVER_S + 0.1)
     bus.hear(0)
-    assert listener.told[-2:] == [("restart", 0), ("step", 0)]
+    assert listener.reported[-2:] == [("restart", 0), ("step", 0)]
     assert listener.clocks == ["boot-1", "boot-1", "boot-2"]
 
 
@@ -224,7 +224,7 @@ def test_a_pairing_with_another_device_begins_anew_with_the_last_steps_of_that()
     bus.hear(0)
     bus.kept, bus.boot = range(7), "boot-b"
     bus.pair("boot-b", "b")
-    assert listener.told[-6:] == [("restart", 2), *(("step", k) for k in range(2, 7))]
+    assert listener.reported[-6:] == [("restart", 2), *(("step", k) for k in range(2, 7))]
     bus.hear(1, boot="boot-1")
     bus.hear(7, instance="b", boot="boot-b")
     assert listener.steps == [0, *range(2, 8)]
@@ -262,7 +262,7 @@ def test_where_the_device_does_not_answer_only_a_jump_that_can_be_is_taken_over(
     bus.hear(LARGEST_JUMP + 2)
     assert listener.steps == [0]
     bus.hear(9)
-    assert listener.told[-2:] == [("restart", 9), ("step", 9)]
+    assert listener.reported[-2:] == [("restart", 9), ("step", 9)]
 
 
 def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> None:
@@ -278,7 +278,7 @@ def test_a_feed_ahead_of_its_device_begins_anew_with_what_the_device_says() -> N
     bus.wait(2.0)
     bus.kept = range(5)
     bus.hear(4)
-    assert listener.told[-5:] == [("step", k) for k in range(5)][-5:]
+    assert listener.reported[-5:] == [("step", k) for k in range(5)][-5:]
     bus.hear(5)
     assert listener.steps[-1] == 5
 
@@ -322,7 +322,7 @@ def test_a_pairing_that_is_heard_again_changes_nothing() -> None:
     for _ in range(3):
         bus.pair("boot-1")
     bus.hear(3)
-    assert listener.told == [("restart", 0), *(("step", k) for k in range(4))]
+    assert listener.reported == [("restart", 0), *(("step", k) for k in range(4))]
 
 
 def test_who_hears_a_late_step_first_is_given_as_many_before_it_as_it_remembers() -> None:
@@ -330,7 +330,7 @@ def test_who_hears_a_late_step_first_is_given_as_many_before_it_as_it_remembers(
     listener = Listener(bus, memory_steps=5)
     bus.kept = range(40)
     bus.hear(40)
-    assert listener.told == [("restart", 35), *(("step", k) for k in range(35, 41))]
+    assert listener.reported == [("restart", 35), *(("step", k) for k in range(35, 41))]
 
 
 def test_however_often_a_step_comes_again_its_device_is_asked_once_a_second() -> None:
@@ -357,9 +357,9 @@ def test_an_answer_that_cannot_be_is_as_if_there_were_none(damage: dict[str, Any
     listener = Listener(bus)
     bus.kept, bus.damage = range(8), damage
     bus.hear(8)
-    assert listener.told[-2:] == [("restart", 8), ("step", 8)]
+    assert listener.reported[-2:] == [("restart", 8), ("step", 8)]
     assert listener.steps == [0, 1, 2, 8]
-    assert Listener(bus).told == []
+    assert Listener(bus).reported == []
 
 
 @given(
@@ -376,7 +376,7 @@ def test_steps_are_consecutive_between_restarts_whatever_is_heard(
         bus.kept = range(max(joined, index))
         bus.hear(index)
     expected = None
-    for kind, index in listener.told:
+    for kind, index in listener.reported:
         assert expected is None or index >= expected
         if kind == "step":
             assert index == expected

@@ -144,7 +144,7 @@ GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
         (b'time_s,x_m,y_m\n0,"0,0\n1,0,0\n', 3, "not a CSV file"),
     ],
 )
-def test_a_mistake_is_told_with_file_and_line(
+def test_a_mistake_is_reported_with_file_and_line(
     tmp_path: Path, content: bytes, line: int | None, said: str
 ) -> None:
     file = tmp_path / "bad.csv"

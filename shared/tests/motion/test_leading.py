@@ -74,11 +74,11 @@ def test_the_sensor_passes_a_steady_force_and_holds_fast_ones_back():
     np.testing.assert_allclose(sensor.read(steady, period_s), steady)
     for hz, gain in ((3.0, 1.0), (30.0, 2**-0.5), (300.0, 0.1)):
         times = np.arange(2000) * period_s
-        told = [
+        reported = [
             ForceSensor.read(sensor, steady * np.sin(2 * np.pi * hz * t), period_s)[0]
             for t in times
         ]
-        assert np.abs(told[1000:]).max() == pytest.approx(gain, rel=0.25)
+        assert np.abs(reported[1000:]).max() == pytest.approx(gain, rel=0.25)
     with pytest.raises(ValueError, match="bandwidth_hz"):
         ForceSensor(0.0)
 

@@ -64,7 +64,7 @@ def turning(*ends_rad: float) -> list[Segment]:
     ]
 
 
-def test_hands_that_turn_alike_are_told_from_those_that_turn_the_other_way():
+def test_hands_that_turn_alike_are_distinguished_from_those_that_turn_the_other_way():
     every = turn_agreement(turning(1.0, 1.3, 0.8))
     assert every.alike == (0, 1, 2)
     assert turn_agreement(turning(np.pi, -np.pi, -3.0, -3.3)).alike == (1, 2, 3)

@@ -119,8 +119,8 @@ ARRAYS = {
 def test_an_array_that_is_none_is_refused(
     parts: Parts, tmp_path: Path, content: bytes, says: str
 ) -> None:
-    told = refused(tmp_path, packed({**parts, MEANS: content}))
-    assert any(word in told for word in says.split("|")), told
+    reported = refused(tmp_path, packed({**parts, MEANS: content}))
+    assert any(word in reported for word in says.split("|")), reported
 
 
 MANIFESTS: dict[str, tuple[Callable[[bytes], bytes], str]] = {
@@ -176,9 +176,9 @@ def test_a_manifest_that_is_none_is_refused(
     "name", ["arrays/extra.npy", "arrays/../../x.npy", "/etc/x.npy", "extra", "arrays/", "a" * 9999]
 )
 def test_an_entry_that_no_model_has_is_refused(parts: Parts, tmp_path: Path, name: str) -> None:
-    told = refused(tmp_path, packed({**parts, name: shaped("(1,)")}))
-    assert "none of this model" in told or "no part of a model" in told
-    assert len(told) < 500
+    reported = refused(tmp_path, packed({**parts, name: shaped("(1,)")}))
+    assert "none of this model" in reported or "no part of a model" in reported
+    assert len(reported) < 500
 
 
 def test_a_name_that_stands_twice_is_refused(parts: Parts, tmp_path: Path) -> None:
@@ -269,8 +269,8 @@ except ModelFileError as error:
     print((getrusage(RUSAGE_SELF).ru_maxrss - before_kb) // 1000, error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
-    grown_mb, _, told = done.stdout.partition(" ")
-    assert "arrays/parameters.means.npy is damaged" in told, done
+    grown_mb, _, reported = done.stdout.partition(" ")
+    assert "arrays/parameters.means.npy is damaged" in reported, done
     assert int(grown_mb) < unpacked_mb / 2
 
 

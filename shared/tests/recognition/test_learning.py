@@ -134,7 +134,7 @@ def spoiled(values):
         (lambda m: [bad(m, positions=m.positions * 1e-3)], "'go'.*makes 0 steps, but 2 are needed"),
     ],
 )
-def test_demonstrations_that_cannot_be_learned_from_are_told_with_the_remedy(
+def test_demonstrations_that_cannot_be_learned_from_are_reported_with_the_remedy(
     task, performances, spoil, message
 ):
     with pytest.raises(LearningError, match=message):
@@ -248,7 +248,7 @@ def resampled(demonstration, times):
     return Demonstration(demonstration.name, wanted / 100.0, np.stack(at, axis=1), states)
 
 
-def test_a_window_that_is_set_too_short_is_told(task, performances):
+def test_a_window_that_is_set_too_short_is_reported(task, performances):
     said = []
     demonstrations = [performances(["along", "round", "up"], seed) for seed in range(2)]
     learn(task, demonstrations, LearningSettings(window_limit_steps=10), progress=said.append)

@@ -60,13 +60,13 @@ def test_the_hash_tells_models_apart(model):
     assert with_hash(changed).hash != with_hash(model).hash
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(ModelFileError, match=r"no such model file.*hmcs train"):
         load_model(tmp_path / "none.hmcs")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
-def test_a_truncated_file_is_told(saved, share):
+def test_a_truncated_file_is_reported(saved, share):
     _, path = saved
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     with pytest.raises(ModelFileError, match="no model file, or a truncated one"):
@@ -103,7 +103,7 @@ def _drop_array(_, parts):
         (_drop_array, "not a complete model"),
     ],
 )
-def test_a_changed_file_is_told(saved, change, message):
+def test_a_changed_file_is_reported(saved, change, message):
     _, path = saved
     rewritten(path, change)
     with pytest.raises(ModelFileError, match=message):
@@ -117,7 +117,7 @@ def test_a_changed_file_is_told(saved, change, message):
         ("variances", 0.0, "positive variances"),
     ],
 )
-def test_numbers_that_cannot_be_are_told(model, tmp_path, field, value, message):
+def test_numbers_that_cannot_be_are_reported(model, tmp_path, field, value, message):
     array = getattr(model.knowledge.parameters, field).copy()
     array.flat[3] = value
     save_model(with_parameters(model, **{field: array}), tmp_path / "m")
@@ -125,7 +125,7 @@ def test_numbers_that_cannot_be_are_told(model, tmp_path, field, value, message)
         load_model(tmp_path / "m")
 
 
-def test_arrays_that_do_not_fit_together_are_told(model, tmp_path):
+def test_arrays_that_do_not_fit_together_are_reported(model, tmp_path):
     short = model.knowledge.parameters.skip[:, :-1]
     save_model(with_parameters(model, skip=short), tmp_path / "m")
     with pytest.raises(ModelFileError, match="'skip' is float64 of shape"):

@@ -35,14 +35,14 @@ def believed(guarded: Guarded, index: int) -> int:
 
 
 def test_after_a_failure_another_recognizer_goes_on_with_the_next_step() -> None:
-    told: list[str] = []
-    guarded = Guarded(Sure(0, fails_at=(5,)), lambda: Sure(1), told.append)
+    reported: list[str] = []
+    guarded = Guarded(Sure(0, fails_at=(5,)), lambda: Sure(1), reported.append)
     assert [believed(guarded, t) for t in range(5)] == [0] * 5
     with pytest.raises(ZeroDivisionError, match="one bad moment"):
         guarded.step(step_at(5))
-    assert not told
+    assert not reported
     assert [believed(guarded, t) for t in range(6, 9)] == [1] * 3
-    assert told == [
+    assert reported == [
         "the recognizer failed (step 5: ZeroDivisionError('one bad moment')): it begins anew with "
         "step 6"
     ]
@@ -67,20 +67,20 @@ def test_without_another_one_the_same_recognizer_goes_on() -> None:
     assert believed(guarded, 2) == 2
 
 
-def test_one_that_fails_at_every_step_is_told_of_once_and_made_anew_each_time() -> None:
-    told, made = list[str](), list[Sure]()
+def test_one_that_fails_at_every_step_is_reported_once_and_made_anew_each_time() -> None:
+    reported, made = list[str](), list[Sure]()
 
     def anew() -> Sure:
         made.append(Sure(0, fails_at=tuple(range(8))))
         return made[-1]
 
-    guarded = Guarded(anew(), anew, told.append)
+    guarded = Guarded(anew(), anew, reported.append)
     for t in range(8):
         with pytest.raises(ZeroDivisionError):
             guarded.step(step_at(t))
     assert believed(guarded, 8) == 0
     assert len(made) == 9
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_where_no_other_can_be_made_it_is_tried_again() -> None:

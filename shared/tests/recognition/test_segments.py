@@ -32,7 +32,7 @@ def test_what_follows_after_a_stretch_without_a_label_is_not_known(task: Task) -
     assert turn.after is None
 
 
-def test_demonstrations_of_one_name_are_told_apart(task: Task) -> None:
+def test_demonstrations_of_one_name_are_distinguished(task: Task) -> None:
     same = [demonstration(["go"] * 4), demonstration(["go"] * 5)]
     assert [segment.demonstration_index for segment in segments_of(task, same)] == [0, 1]
 
@@ -46,7 +46,7 @@ def test_a_step_has_the_label_of_the_sample_midway_in_it(task: Task) -> None:
         assert found.states.tolist() == expected, switch
 
 
-def test_a_label_that_is_no_state_is_quoted_and_can_be_told_without(task: Task) -> None:
+def test_a_label_that_is_no_state_is_quoted_and_can_be_reported_without(task: Task) -> None:
     with pytest.raises(
         LearningError, match=r"label 'goo' at 0.00 s .* did you mean 'go'"
     ) as caught:

@@ -24,9 +24,9 @@ def test_about_one_window_in_a_hundred_of_known_motion_is_an_alarm_at_most():
 def test_motion_that_fits_much_worse_is_an_alarm_once_the_window_is_full():
     rng = np.random.default_rng(0)
     settings = learn_alarm([rng.normal(2.0, 1.0, 100) for _ in range(5)], 20)
-    told = alarms(settings, rng.normal(-3.0, 1.0, 60))
-    assert not any(told[:19])
-    assert all(told[19:])
+    reported = alarms(settings, rng.normal(-3.0, 1.0, 60))
+    assert not any(reported[:19])
+    assert all(reported[19:])
 
 
 def test_one_impossible_step_is_no_alarm():

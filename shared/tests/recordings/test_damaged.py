@@ -44,7 +44,7 @@ def texts(content: RecordingContent) -> Counter[bytes]:
     return Counter(message.text for message in content.messages)
 
 
-def told(content: RecordingContent) -> str:
+def heard(content: RecordingContent) -> str:
     return "\n".join(inspected(content).problems)
 
 
@@ -55,7 +55,7 @@ def test_every_form_of_the_field_is_read_whole(form: Path, take: Path) -> None:
     assert content.duration_s == read(take).duration_s
 
 
-def test_a_bit_turned_anywhere_loses_one_chunk_at_most_and_that_is_told(
+def test_a_bit_turned_anywhere_loses_one_chunk_at_most_and_that_is_reported(
     form: Path, tmp_path: Path
 ) -> None:
     data, sent = form.read_bytes(), texts(read(form))
@@ -95,7 +95,7 @@ def test_a_block_of_the_disk_that_was_lost_is_read_around(
         assert content.last_ns == last_ns, at
 
 
-def test_what_is_missing_is_told_with_its_times(take: Path, tmp_path: Path) -> None:
+def test_what_is_missing_is_reported_with_its_times(take: Path, tmp_path: Path) -> None:
     begin, end = chunks_of(take)[4]
     bad = with_bytes(take, tmp_path / "bad.mcap", (begin + end) // 2, b"\0" * 8, 8)
     content, whole = read(bad), read(take)
@@ -104,10 +104,10 @@ def test_what_is_missing_is_told_with_its_times(take: Path, tmp_path: Path) -> N
     (gap,) = content.gaps
     assert (gap.begin_ns, gap.end_ns) == (min(times), max(times))
     assert content.lost == missing.total()
-    found = re.search(r"between (\d+\.\d+) s and (\d+\.\d+) s something is missing", told(content))
+    found = re.search(r"between (\d+\.\d+) s and (\d+\.\d+) s something is missing", heard(content))
     assert found is not None
     assert [round(float(t) * 1e9) + BEGUN_NS for t in found.groups()] == [min(times), max(times)]
-    assert "last moments" not in told(content)
+    assert "last moments" not in heard(content)
 
 
 def test_the_beginning_stays_the_beginning_though_its_chunk_is_damaged(
@@ -144,11 +144,11 @@ def test_channels_that_nothing_describes_any_more_are_known_by_what_their_messag
     assert {message.key.partition("/")[0] for message in content.messages} == {"unknown"}
 
 
-def test_messages_of_which_nothing_is_known_are_told(take: Path, tmp_path: Path) -> None:
+def test_messages_of_which_nothing_is_known_are_reported(take: Path, tmp_path: Path) -> None:
     other = rewritten(take, tmp_path / "plain.mcap", indexed=False, order=without_schema)
     begin, end = chunks_of(other)[0]
     bad = with_bytes(other, tmp_path / "bad.mcap", (begin + end) // 2, b"\0" * 8, 8)
-    assert re.search(r"[1-9]\d* messages of channels that nothing describes", told(read(bad)))
+    assert re.search(r"[1-9]\d* messages of channels that nothing describes", heard(read(bad)))
 
 
 def without_schema(rows: list[Message]) -> Iterator[Message]:
@@ -170,12 +170,14 @@ def test_a_beginning_that_is_damaged_loses_nothing_of_a_file_that_was_ended(
     assert texts(read(bad)) == texts(read(take))
 
 
-def test_a_chunk_that_is_gone_as_if_it_had_never_been_is_told(take: Path, tmp_path: Path) -> None:
+def test_a_chunk_that_is_gone_as_if_it_had_never_been_is_reported(
+    take: Path, tmp_path: Path
+) -> None:
     begin, end = chunks_of(take)[4]
     content = read(with_bytes(take, tmp_path / "bad.mcap", begin, b"", end - begin))
     assert len(content.messages) == len(read(take).messages) - 25
-    assert "its index is damaged" in told(content)
+    assert "its index is damaged" in heard(content)
     # One whose opcode became one that may be passed over.
     content = read(with_bytes(take, tmp_path / "bad.mcap", begin, b"\x90", 1))
     assert content.lost == 25
-    assert "a record of a kind that is unknown here (144)" in told(content)
+    assert "a record of a kind that is unknown here (144)" in heard(content)

@@ -107,7 +107,7 @@ def test_arrays_hold_what_tables_hold_however_few_columns_are_held(
         assert "_x" in one.files
 
 
-def test_tables_that_would_be_too_large_are_told_and_nothing_is_left(
+def test_tables_that_would_be_too_large_are_reported_and_nothing_is_left(
     maker: Maker,
     performed: Callable[..., list[Said]],
     tmp_path: Path,

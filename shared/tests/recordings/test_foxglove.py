@@ -84,6 +84,6 @@ def test_a_hand_without_orientation_is_shown_upright() -> None:
     motion = Motion(position=np.ones(3), velocity=np.zeros(3), dead_man=True)
     fields = fields_of(encode(motion, Envelope(source=ROBOT, seq=0)))
     for left_out in ((), ("orientation", "wrench", "origin", "clutch")):
-        told = {name: value for name, value in fields.items() if name not in left_out}
-        (shown,) = FoxgloveConverter().of(told, 1)
+        reported = {name: value for name, value in fields.items() if name not in left_out}
+        (shown,) = FoxgloveConverter().of(reported, 1)
         assert shown.fields["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}

@@ -108,7 +108,7 @@ def test_beliefs_that_came_later_make_it_stiffen_later(said: list[Logged], again
     assert figures.takes_hold_later_ms == pytest.approx(late_ns / 1e6, abs=PERIOD_NS / 1e6)
 
 
-def test_without_a_recorded_fixture_it_is_told_that_there_is_nothing_to_compare_with(
+def test_without_a_recorded_fixture_it_is_reported_that_there_is_nothing_to_compare_with(
     said: list[Logged], again: Again
 ) -> None:
     replay, fixture = again([each for each in said if not each.is_of(FixtureState)])
@@ -178,11 +178,11 @@ def test_a_recording_of_steps_alone_has_no_fixture_and_says_so(
     assert {row["replayed_factor"] for row in rows_of(replay, fixture)} == {""}
 
 
-def test_safeguards_are_those_the_recorded_fixture_controller_told(
+def test_safeguards_are_those_the_recorded_fixture_controller_reported(
     said: list[Logged], again: Again
 ) -> None:
-    told = safeguards_from(SETTINGS.model_dump(mode="json"))
-    assert told == SETTINGS.safeguards != Safeguards()
+    reported = safeguards_from(SETTINGS.model_dump(mode="json"))
+    assert reported == SETTINGS.safeguards != Safeguards()
     assert safeguards_from({"settle_ms": "soon", "input_stale_after_ms": 50}) == Safeguards(
         input_stale_after_s=0.05
     )
@@ -202,9 +202,9 @@ def test_each_step_tells_the_factor_at_the_sample_that_completed_it(
     steps = [each for each in said if each.is_of(Step)]
     for row, step in zip(rows_of(replay, fixture), steps, strict=True):
         assert step.envelope.origin is not None
-        told = at_sample[step.envelope.origin.seq]
-        assert row["recorded_factor"] == told.factor
-        assert row["replayed_compliance"] == pytest.approx(told.compliance, abs=1e-6)
+        reported = at_sample[step.envelope.origin.seq]
+        assert row["recorded_factor"] == reported.factor
+        assert row["replayed_compliance"] == pytest.approx(reported.compliance, abs=1e-6)
 
 
 @pytest.mark.parametrize(("later_ticks", "later_ms"), [(40, 400.0), (140, math.nan)])

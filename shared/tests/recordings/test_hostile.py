@@ -90,7 +90,7 @@ BOMB = zstandard.compress(ZEROS)
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_no_part_of_a_recording_is_told(
+def test_what_is_no_part_of_a_recording_is_reported(
     tmp_path: Path, made: Callable[[], bytes], says: str
 ) -> None:
     path = file_of(tmp_path / "made.mcap", made())
@@ -148,7 +148,7 @@ def test_a_file_that_just_begins_is_one_that_was_cut_off(tmp_path: Path, size: i
 
 
 @pytest.mark.parametrize("error", [MemoryError(), OSError(5, "Input/output error")])
-def test_what_the_machine_lacks_is_told(
+def test_what_the_machine_lacks_is_reported(
     take: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     content = read(take)
@@ -164,7 +164,7 @@ def test_what_the_machine_lacks_is_told(
         read(take)
 
 
-def test_a_file_that_changes_while_it_is_read_is_told(take: Path, tmp_path: Path) -> None:
+def test_a_file_that_changes_while_it_is_read_is_reported(take: Path, tmp_path: Path) -> None:
     content = read(take)
     begin, end = chunks_of(take)[1]
     take.write_bytes(
@@ -223,7 +223,7 @@ def with_texts(
     ],
     ids=lambda junk: repr(junk[:20]),
 )
-def test_messages_that_are_none_are_passed_over_and_told(
+def test_messages_that_are_none_are_passed_over_and_reported(
     take: Path, tmp_path: Path, junk: bytes
 ) -> None:
     path = rewritten(take, tmp_path / "junk.mcap", begin=with_texts(junk))
@@ -235,7 +235,7 @@ def test_messages_that_are_none_are_passed_over_and_told(
     assert len(demonstrations_of(content)[0].time_s) == 60
 
 
-def test_messages_in_another_encoding_are_told(take: Path, tmp_path: Path) -> None:
+def test_messages_in_another_encoding_are_reported(take: Path, tmp_path: Path) -> None:
     path = rewritten(take, tmp_path / "cbor.mcap", begin=with_texts(b"\xa0", encoding="cbor"))
     assert "encoded as 'cbor', not as JSON" in "\n".join(inspected(read(path)).problems)
     used(path)
@@ -283,7 +283,7 @@ def test_attachments_are_read_when_they_are_asked_for(
     monkeypatch.undo()
 
 
-def test_more_overlapping_messages_than_are_held_are_told(
+def test_more_overlapping_messages_than_are_held_are_reported(
     take: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mixed = rewritten(take, tmp_path / "mixed.mcap", order=lambda rows: rows[::-1])
@@ -292,19 +292,25 @@ def test_more_overlapping_messages_than_are_held_are_told(
         list(read(mixed).messages)
 
 
-def test_more_labels_than_are_used_are_told(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_labels_than_are_used_are_reported(
+    take: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(labels, "MOST_LABELS", 0)
     with pytest.raises(RecordingError, match="more than 0 labels"):
         labels.labels_of(read(take))
 
 
-def test_more_steps_than_are_replayed_are_told(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_steps_than_are_replayed_are_reported(
+    take: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(replaying, "MOST_STEPS", 3)
     with pytest.raises(RecordingError, match="steps, more than 3: replay a part of it"):
         replaying.replayed(read(take), None)  # type: ignore[arg-type]
 
 
-def test_more_parts_than_are_noted_are_told(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_parts_than_are_noted_are_reported(
+    take: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(scan, "MOST_BLOCKS", 2)
     content = read(take)
     assert len(content.messages) > len(list(content.messages)) or "more than 2" in content.damage

@@ -45,7 +45,7 @@ def test_every_number_comes_back_to_the_last_bit(values: list[float]) -> None:
         (b"\x80", "none of this contract"),
     ],
 )
-def test_what_is_no_message_is_told(payload: bytes, says: str) -> None:
+def test_what_is_no_message_is_reported(payload: bytes, says: str) -> None:
     with pytest.raises(NoMessageError, match=says):
         fields_of(payload)
 

@@ -73,14 +73,16 @@ def states(path: Path) -> list[str]:
         ("0,1,go\n", ":1: expected the header"),
     ],
 )
-def test_what_is_no_file_of_labels_is_told_with_its_line(take: Path, text: str, says: str) -> None:
+def test_what_is_no_file_of_labels_is_reported_with_its_line(
+    take: Path, text: str, says: str
+) -> None:
     labels_beside(take).write_text(text, encoding="utf-8", newline="")
     with pytest.raises(RecordingError, match=f"take.labels.csv.*({says})"):
         labels_of(read(take))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
-def test_a_file_in_another_encoding_is_told(take: Path, encoding: str) -> None:
+def test_a_file_in_another_encoding_is_reported(take: Path, encoding: str) -> None:
     labels_beside(take).write_bytes((HEAD + "0,1,gö\n").encode(encoding))
     with pytest.raises(RecordingError, match="not UTF-8 text: save it as CSV in UTF-8"):
         labels_of(read(take))
@@ -127,13 +129,13 @@ def test_whatever_stands_there_is_labels_or_a_mistake_of_the_user(
         ("1790000000000000000,1790000001500000000,go\n", "nanoseconds since 1970"),
     ],
 )
-def test_times_in_another_unit_are_told_as_such(take: Path, rows: str, unit: str) -> None:
+def test_times_in_another_unit_are_reported_as_such(take: Path, rows: str, unit: str) -> None:
     labels_beside(take).write_text(HEAD + rows)
     with pytest.raises(RecordingError, match=f"lasts 2.4.* read like {unit}"):
         labels_of(read(take))
 
 
-def test_a_label_that_ends_a_little_late_counts_and_is_told(take: Path) -> None:
+def test_a_label_that_ends_a_little_late_counts_and_is_reported(take: Path) -> None:
     labels_beside(take).write_text(HEAD + "0,1,go\n1,2.9,turn\n")
     assert states(take) == ["go", "turn"]
     (note,) = label_notes(read(take))
@@ -254,14 +256,16 @@ def test_labels_of_another_recording_are_moved_aside_and_not_lost(
     assert write_labels(read(take), []) is None
 
 
-def test_where_labels_cannot_be_written_it_is_told(take: Path) -> None:
+def test_where_labels_cannot_be_written_it_is_reported(take: Path) -> None:
     labels_beside(take).mkdir()
     with pytest.raises(RecordingError, match=r"take\.labels\.csv: cannot be written"):
         write_labels(read(take), [])
     assert [file.name for file in take.parent.iterdir() if file.name.startswith(".")] == []
 
 
-def test_a_file_that_cannot_be_read_is_told(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_cannot_be_read_is_reported(
+    take: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     labels_beside(take).write_text(HEAD)
 
     def refuse(*_: object, **__: object) -> None:

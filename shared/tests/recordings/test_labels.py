@@ -53,7 +53,7 @@ def test_labels_beside_a_recording_count_instead_and_never_change_it(
         ("begin_s,end_s,state\n0,1\n", ":2: expected begin_s,end_s,state"),
     ],
 )
-def test_labels_that_cannot_be_are_told_with_their_line(
+def test_labels_that_cannot_be_are_reported_with_their_line(
     maker: Maker, performed: Callable[..., list[Said]], text: str, says: str
 ) -> None:
     path = maker.write(performed())

@@ -95,7 +95,7 @@ def test_labels_that_cannot_be_leave_those_there_are(
     assert file.read_bytes() == before
 
 
-def test_recordings_are_told_newest_first_and_found_by_name(
+def test_recordings_are_reported_newest_first_and_found_by_name(
     maker: Maker, performed: Performed
 ) -> None:
     paths = [maker.write(performed(("go",)), name) for name in ("one", "two")]
@@ -162,7 +162,7 @@ def test_labels_made_of_demonstrations_make_the_very_same_again(
 # --- found labels ---------------------------------------------------------------------------------
 
 
-def test_found_labels_are_told_from_those_somebody_changed(
+def test_found_labels_are_distinguished_from_those_somebody_changed(
     maker: Maker, performed: Performed
 ) -> None:
     path = maker.write(performed(("go", "turn")))

@@ -79,7 +79,7 @@ def test_it_opens_in_the_fields_own_reader_with_poses_in_its_own_schemas(
     assert {schema.encoding for schema in summary.schemas.values()} == {"jsonschema"}
 
 
-def test_what_is_no_recording_is_told(tmp_path: Path) -> None:
+def test_what_is_no_recording_is_reported(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be read"):
         read(tmp_path / "none.mcap")
     (tmp_path / "text.mcap").write_text("time_s,x_m\n0,1\n")
@@ -87,7 +87,7 @@ def test_what_is_no_recording_is_told(tmp_path: Path) -> None:
         read(tmp_path / "text.mcap")
 
 
-def test_a_recording_of_another_version_of_the_contract_is_told(
+def test_a_recording_of_another_version_of_the_contract_is_reported(
     maker: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = maker.write(

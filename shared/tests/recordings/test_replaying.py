@@ -40,8 +40,8 @@ def take(tmp_path: Path) -> Take:
             file = tmp_path / f"{name}.hmcs"
             save_model(model._replace(name=name), file)
             kept[file.name] = file.read_bytes()
-        told = {"active_model": followed, "settings": json.dumps({})}
-        preface = Preface({"fixture_controller/f": told}, kept)
+        reported = {"active_model": followed, "settings": json.dumps({})}
+        preface = Preface({"fixture_controller/f": reported}, kept)
         recording = Recording(tmp_path / "takes", "take", ROOMY, lambda: preface, BEGUN_NS, "test")
         recording.finish()
         return recording.path
@@ -60,7 +60,7 @@ def test_the_model_kept_alone_or_followed_is_replayed(
 
 
 @pytest.mark.parametrize(("names", "says"), [((), "none"), (("one", "two"), "one.hmcs, two.hmcs")])
-def test_where_nobody_knows_which_the_models_there_are_told(
+def test_where_nobody_knows_which_the_models_there_are_reported(
     take: Take, names: tuple[str, ...], says: str
 ) -> None:
     with pytest.raises(RecordingError, match=f"{says}; name one with --model"):

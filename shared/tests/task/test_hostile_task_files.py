@@ -128,13 +128,13 @@ def test_the_bounds_are_reached_and_not_passed() -> None:
             read_yaml(text)
 
 
-def test_no_more_mistakes_are_told_than_are_mended_at_once(check: Check) -> None:
+def test_no_more_mistakes_are_reported_than_are_mended_at_once(check: Check) -> None:
     problems = check(HEAD + "".join(f"k{k}: 1\n" for k in range(4_000)))
     assert len(problems) == MOST_TOLD + 1
     assert "there are more" in problems[-1].message
 
 
-def test_many_unknown_names_among_many_are_told_in_part(check: Check) -> None:
+def test_many_unknown_names_among_many_are_reported_in_part(check: Check) -> None:
     problems = check(task_of(400, lambda _: [f"none{k}" for k in range(10)]))
     assert len(problems) == MOST_TOLD
     assert max(len(problem.message) for problem in problems) == LONGEST_MESSAGE

@@ -168,16 +168,16 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("old", "new", "line", "path", "said"), MISTAKES)
-def test_a_mistake_is_told_at_its_line_and_field(
+def test_a_mistake_is_reported_at_its_line_and_field(
     check: Check, old: str, new: str, line: int, path: str, said: str
 ) -> None:
     assert old in GOOD
     problems = check(GOOD.replace(old, new, 1))
-    told = [(p.line, p.path) for p in problems if said in p.message]
-    assert (line, path) in told, format_problems(problems)
+    heard = [(p.line, p.path) for p in problems if said in p.message]
+    assert (line, path) in heard, format_problems(problems)
 
 
-def test_all_mistakes_of_a_file_are_told_at_once_in_order(check: Check) -> None:
+def test_all_mistakes_of_a_file_are_reported_at_once_in_order(check: Check) -> None:
     text = GOOD
     some = [0, 11, 15, 24, 33]
     for old, new, *_ in (MISTAKES[index] for index in some):
@@ -210,13 +210,13 @@ def test_a_mistake_in_a_state_does_not_make_up_others(check: Check) -> None:
         ("a: !!python/object:os.system {}\n", 1, "not YAML"),
     ],
 )
-def test_what_is_no_mapping_is_told(check: Check, content: str, line: int, said: str) -> None:
+def test_what_is_no_mapping_is_reported(check: Check, content: str, line: int, said: str) -> None:
     (problem,) = check(content)
     assert said in problem.message
     assert problem.line == line
 
 
-def test_bytes_that_are_no_text_are_told(tmp_path: Path) -> None:
+def test_bytes_that_are_no_text_are_reported(tmp_path: Path) -> None:
     file = tmp_path / "t.yaml"
     file.write_bytes(b"name: x\nother: \xff\n")
     (problem,) = check_task(file)
@@ -295,7 +295,7 @@ json_values = st.recursive(
 
 
 @given(st.data())
-def test_any_value_anywhere_is_told_as_a_problem_or_taken(
+def test_any_value_anywhere_is_reported_as_a_problem_or_taken(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     task: Any = copy.deepcopy(yaml.safe_load(GOOD))
@@ -346,7 +346,7 @@ def test_an_obstacle_has_the_measures_of_its_shape(
         ("law: soft", "general"),
     ],
 )
-def test_a_fixture_that_cannot_be_is_told_with_its_line(
+def test_a_fixture_that_cannot_be_is_reported_with_its_line(
     check: Check, fixture: str, says: str
 ) -> None:
     (problem,) = check(f"{GOOD}fixture:\n  {fixture}\n")
@@ -363,7 +363,7 @@ def test_a_fixture_that_cannot_be_is_told_with_its_line(
         ("volume: {knots: []}", "no radius"),
     ],
 )
-def test_a_states_fixture_that_contradicts_itself_is_told(
+def test_a_states_fixture_that_contradicts_itself_is_reported(
     check: Check, fixture: str, says: str
 ) -> None:
     text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{fixture}}}")
@@ -382,7 +382,7 @@ def test_a_state_may_go_by_a_plan_or_to_a_target(check: Check) -> None:
         assert check(text) == []
 
 
-def test_an_axis_both_shared_and_blocked_is_told(check: Check) -> None:
+def test_an_axis_both_shared_and_blocked_is_reported(check: Check) -> None:
     shared = "plan: {}, shared: {operator_axes: [vx, wz]}"
     text = GOOD.replace("    next: [fall]", f"    next: [fall]\n    fixture: {{{shared}}}")
     (problem,) = check(f"{text}fixture:\n  axis_scale: [1, 1, 1, 1, 1, 0]\n")

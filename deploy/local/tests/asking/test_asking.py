@@ -26,7 +26,7 @@ IMPOSSIBLE = ["evil name", "\x1b[2J\x1b]0;pwned\x07x", "n" * 300, "\u202egnp", "
         (("record", "--stop"), "recorder", "record", Record(on=False)),
     ],
 )
-def test_what_is_asked_for_is_carried_out_by_all_and_told(
+def test_what_is_asked_for_is_carried_out_by_all_and_reported(
     hmcs: Any,
     router: str,
     seen: Callable[[int], None],
@@ -86,7 +86,7 @@ def test_one_that_refuses_or_is_a_name_only_keeps_nobody_else_from_doing_it(
 @pytest.mark.parametrize(
     ("word", "service"), [("stop", "robot"), ("cancel", "trainer"), ("record", "recorder")]
 )
-def test_where_nobody_is_there_that_is_told(
+def test_where_nobody_is_there_that_is_reported(
     hmcs: Any, router: str, observer: Bus, seen: Callable[[int], None], word: str, service: str
 ) -> None:
     ended = hmcs(word, "--router", router, "--cell", CELL)

@@ -75,7 +75,7 @@ def test_with_two_hands_in_motion_what_is_marked_is_said_of_this_moment(
     assert asked == [("label", Label(state="approach"))]
 
 
-def test_where_nobody_writes_down_what_is_marked_that_is_told(hmcs: Any, router: str) -> None:
+def test_where_nobody_writes_down_what_is_marked_that_is_reported(hmcs: Any, router: str) -> None:
     ended = hmcs("mark", "approach", "--router", router, "--cell", CELL)
     assert ended.returncode == 2
     assert "start a recorder" in ended.stderr

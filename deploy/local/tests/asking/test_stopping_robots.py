@@ -49,7 +49,7 @@ def test_robots_that_hang_keep_no_robot_moving(
     assert {reply.member.instance: reply.done for reply in result[0].each}["z"]
 
 
-def test_a_robot_that_hangs_is_told_and_the_others_stand(
+def test_a_robot_that_hangs_is_reported_and_the_others_stand(
     observer: Bus, robot: Callable[..., Asked], seen: Callable[[int], None]
 ) -> None:
     robot("a", hangs=True)
@@ -61,7 +61,7 @@ def test_a_robot_that_hangs_is_told_and_the_others_stand(
     assert well
 
 
-def test_a_robot_whose_presence_is_not_known_stands_and_is_told(
+def test_a_robot_whose_presence_is_not_known_stands_and_is_reported(
     observer: Bus, robot: Callable[..., Asked], eventually: Eventually
 ) -> None:
     robot("hidden", is_present=False)
@@ -111,7 +111,7 @@ def test_one_that_answers_in_a_robots_place_is_not_that_robot(
     assert all(member.service == "robot" for member in replies)
 
 
-def test_trouble_with_one_robot_is_told_as_its_own(
+def test_trouble_with_one_robot_is_reported_as_its_own(
     observer: Bus,
     robot: Callable[..., Asked],
     seen: Callable[[int], None],

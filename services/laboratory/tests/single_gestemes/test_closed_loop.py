@@ -130,11 +130,11 @@ def test_a_step_backwards_keeps_the_heading_and_one_that_tells_nothing_tells_non
 
 def test_the_place_counts_as_evidence_to_its_power_only() -> None:
     place, move = np.zeros((1, 2)), np.array([[0.8, 0.3]])
-    told = {
+    reported = {
         power: advance(loop(position_power=power), ONE, opened(1, 2), place, move).log_density[0]
         for power in (0.0, 0.1, 0.5)
     }
     _, log_near = next_phases(line(), ONE, phases_at_start(1), place + move, 1.0)
-    for power, log_density in told.items():
-        assert log_density == pytest.approx(told[0.0] + power * log_near[0])
+    for power, log_density in reported.items():
+        assert log_density == pytest.approx(reported[0.0] + power * log_near[0])
     assert log_near[0] < -0.05

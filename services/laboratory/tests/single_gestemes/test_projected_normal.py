@@ -51,9 +51,9 @@ def test_directions_of_normal_vectors_are_as_dense_as_it_says(
     seen = np.histogram(angle, edges)[0] / len(angle)
     fine = np.linspace(0, np.pi, 12_001)
     around = 2.0 if dimensions == 2 else 2.0 * np.pi * np.sin(fine)
-    told = around * density(fine, dimensions, 1.0, variance)
+    reported = around * density(fine, dimensions, 1.0, variance)
     expected = [
-        np.trapezoid(told[k : k + 1001], fine[k : k + 1001]) for k in range(0, 12_000, 1000)
+        np.trapezoid(reported[k : k + 1001], fine[k : k + 1001]) for k in range(0, 12_000, 1000)
     ]
     np.testing.assert_allclose(seen, expected, atol=4e-3)
 
@@ -90,8 +90,8 @@ def test_lengths_are_the_derivatives_of_the_density(
 
 def test_without_a_mean_all_directions_are_alike() -> None:
     directions = np.array([[1.0, 0, 0], [0, 0, -1.0]])
-    told = log_density(directions, np.zeros((2, 3)), np.array([1e-6, 1e3]))
-    np.testing.assert_allclose(np.exp(told), 1 / (4 * np.pi), rtol=1e-6)
+    reported = log_density(directions, np.zeros((2, 3)), np.array([1e-6, 1e3]))
+    np.testing.assert_allclose(np.exp(reported), 1 / (4 * np.pi), rtol=1e-6)
     plane = log_density(directions[:1, :2], np.zeros((1, 2)), np.ones(1))
     np.testing.assert_allclose(np.exp(plane), 1 / (2 * np.pi), rtol=1e-6)
 

@@ -43,9 +43,9 @@ def test_lengths_spread_as_they_were_learned() -> None:
     shapes = knowledge.shapes._replace(log_length=lengths, log_length_deviation=0.4)
     knowledge = knowledge._replace(shapes=shapes)
     steps = np.unique(np.geomspace(1, 200, 60).round())
-    told = [voices(knowledge, [line(int(n), 99)], whole=False)[1][0] for n in steps]
+    reported = [voices(knowledge, [line(int(n), 99)], whole=False)[1][0] for n in steps]
     # P(longer than n) of the short one, from the odds against the one of which all go on.
-    survival = np.array([np.exp(short - long) for short, long in told])
+    survival = np.array([np.exp(short - long) for short, long in reported])
     mass = -np.diff(survival, prepend=1.0)
     log_length = np.log(steps)
     mean = (mass * log_length).sum() / mass.sum()

@@ -37,7 +37,7 @@ def test_errors_are_right_on_average(dimensions: int, variance: float, backwards
     np.testing.assert_allclose(found.meant, 1.0)
 
 
-def test_a_direction_that_tells_nothing_is_told_from_one_that_does() -> None:
+def test_a_direction_that_tells_nothing_is_distinguished_from_one_that_does() -> None:
     direction, expected = drawn(2, 0.01, 0.0, 0.2)
     found = errors(direction, expected, np.full(COUNT, 0.01), 0.0, 0.2)
     assert found.meant.mean() == pytest.approx(0.8, abs=0.01)

@@ -22,9 +22,9 @@ def approach(steps: int, past: int = 0) -> np.ndarray:
 
 
 def test_a_hand_that_nears_the_end_is_ever_more_likely_to_leave():
-    told = exit_probability(DEFAULT_WEIGHTS, approach(8))
-    assert (np.diff(told) >= 0).all()
-    assert told[0] < 0.01 < 0.5 < told[-1]
+    reported = exit_probability(DEFAULT_WEIGHTS, approach(8))
+    assert (np.diff(reported) >= 0).all()
+    assert reported[0] < 0.01 < 0.5 < reported[-1]
 
 
 def test_the_regression_agrees_with_scikit_learn():
@@ -42,9 +42,9 @@ def test_the_regression_agrees_with_scikit_learn():
 def test_learned_exits_are_where_segments_ended():
     features = np.vstack([approach(12, past) for past in (0, 0, 1, 0, 1)])
     left = np.concatenate([np.arange(13 + past) == 12 + past for past in (0, 0, 1, 0, 1)])
-    told = exit_probability(fit_exit(features, left), approach(12))
-    assert told[:8].max() < 0.05
-    assert told[-1] > 0.4
+    reported = exit_probability(fit_exit(features, left), approach(12))
+    assert reported[:8].max() < 0.05
+    assert reported[-1] > 0.4
 
 
 def test_exits_are_never_quite_sure():
@@ -88,7 +88,7 @@ def test_before_the_end_eight_steps_count_and_past_it_four():
     assert [line(place) for place in (-5.0, -1.0, 1.0, 3.0)] == [-5.0, -1.0, 1.0, 3.0]
     assert line(-8.0) == line(-50.0) < line(-7.0)
     assert line(4.0) == line(50.0) > line(3.5)
-    # What is far on either side can be told from what is near, whatever the side.
+    # What is far on either side can be distinguished from what is near, whatever the side.
     assert at(-3.0)[0, 6] == at(3.0)[0, 6] > at(1.0)[0, 6] > 0
 
 

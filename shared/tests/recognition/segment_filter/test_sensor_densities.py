@@ -41,7 +41,7 @@ def recognized(model, demonstration):
     return [recognizer.step(step) for step in steps]
 
 
-def test_force_that_fits_no_state_is_told_as_unknown(taught, performances):
+def test_force_that_fits_no_state_is_reported_as_unknown(taught, performances):
     motion = performances(["along", "round", "up"], 50)
     right = recognized(taught, felt(motion, 50))
     pushed = recognized(taught, felt(motion, 50, dict.fromkeys(FORCE_N, 20.0)))
@@ -52,8 +52,8 @@ def test_force_that_fits_no_state_is_told_as_unknown(taught, performances):
 def test_a_silent_sense_speaks_for_nothing(taught, performances):
     motion = performances(["along", "round", "up"], 51)
     silent = recognized(taught, motion)
-    told = recognized(taught, felt(motion, 51))
-    likely = [r.belief.states.argmax() for r in told]
+    reported = recognized(taught, felt(motion, 51))
+    likely = [r.belief.states.argmax() for r in reported]
     assert np.mean([r.belief.states.argmax() for r in silent] == np.array(likely)) > 0.95
 
 
@@ -66,7 +66,7 @@ def test_each_sense_counts_by_its_weight():
     assert log_densities(senses, values)[0, 0] == pytest.approx(2.0 * single[0] + single[2])
 
 
-def test_a_demonstration_without_a_sense_that_counts_is_told(task, performances):
+def test_a_demonstration_without_a_sense_that_counts_is_reported(task, performances):
     demonstrations = [felt(performances(["along", "round", "up"], 0), 0)]
     demonstrations.append(performances(["along", "round", "up"], 1))
     with pytest.raises(LearningError, match=r"'seed-1' has no force: record it, or set its weight"):
