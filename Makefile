@@ -13,10 +13,9 @@ UV := UV_PROJECT_ENVIRONMENT=$(VENV) UV_PYTHON_DOWNLOADS=never $(RUN)/uv
 # the rest of the machine. Without the right to that, nice warns and runs them all the same.
 WHOLE_STACKS := deploy/demo/tests $(addprefix tests/,bench end_to_end faults fuzz hosts)
 BEFORE_OTHERS := nice -n -10
-# Of these `make test` runs what everything else stands on; `make test-long` runs the rest, and the
-# studies and figures of the laboratory.
+# Of these `make test` runs what everything else stands on; `make test-long` runs the rest, the
+# studies and figures of the laboratory, and the tests that are marked as long.
 SHORT_STACKS := tests/end_to_end/test_whole_stack.py tests/fuzz
-STUDIES := services/laboratory/tests
 IN_PARALLEL := -n auto --maxprocesses 4 --dist loadfile
 
 export OMP_NUM_THREADS ?= 1
@@ -34,12 +33,13 @@ demo: $(READY) ## teach the demo task, run the whole stack on held-out human mot
 	@$(RUN)/hmcs demo $(if $(OUTPUT),--output $(OUTPUT))
 
 test: $(READY) ## units, contracts, types and imports, then one whole stack, also under hostile messages
-	@$(RUN)/python -m pytest $(IN_PARALLEL) -m "not containers and not browser" \
-	    $(addprefix --ignore=,$(WHOLE_STACKS) $(STUDIES)) || failed=1; \
+	@$(RUN)/python -m pytest $(IN_PARALLEL) \
+	    -m "not containers and not browser and not long" \
+	    $(addprefix --ignore=,$(WHOLE_STACKS)) || failed=1; \
 	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(SHORT_STACKS) || failed=1; exit $${failed:-0}
 
-test-long: $(READY) ## the other whole stacks (faults, several hosts, every recognizer) and the laboratory; half an hour
-	@$(RUN)/python -m pytest $(IN_PARALLEL) $(STUDIES) || failed=1; \
+test-long: $(READY) ## the other whole stacks (faults, several hosts, every recognizer), the laboratory, long tests; 20 minutes
+	@$(RUN)/python -m pytest $(IN_PARALLEL) -m long $(addprefix --ignore=,$(WHOLE_STACKS)) || failed=1; \
 	  $(BEFORE_OTHERS) $(RUN)/python -m pytest $(filter-out $(SHORT_STACKS),$(WHOLE_STACKS)) \
 	    $(addprefix --ignore=,$(SHORT_STACKS)) || failed=1; exit $${failed:-0}
 

@@ -25,6 +25,7 @@ def named(monkeypatch: pytest.MonkeyPatch) -> set[str]:
     return {page for pages in navigation.values() for page in pages}
 
 
+@pytest.mark.long
 def test_the_navigation_names_every_document(monkeypatch: pytest.MonkeyPatch) -> None:
     documents = {
         path.relative_to(ROOT).with_suffix("").as_posix() for path in ROOT.glob("docs/**/*.md")

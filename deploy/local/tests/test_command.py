@@ -151,6 +151,7 @@ def test_up_on_a_taken_port_is_refused(
         assert "taken" in mistake(hmcs("up", "--router", endpoint))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
@@ -243,6 +244,7 @@ def test_a_task_file_is_checked(hmcs: Run, tmp_path: Path) -> None:
     assert "gestemes" in done.stderr
 
 
+@pytest.mark.long
 def test_a_model_is_trained_from_demonstrations(hmcs: Run, tmp_path: Path) -> None:
     shapes = ("GShape", "NShape", "PShape", "JShape", "Snake")
     drawings = [f"lasa:{shape}/1-3" for shape in shapes]

@@ -25,6 +25,7 @@ from hmcs_local.swap import SwapError
 from support.deployed import CELL, UP_WITHIN_S, Cell, Eventually, Served
 
 
+@pytest.mark.long
 def test_a_newcomer_takes_over_is_replaced_and_comes_back(
     cell: Cell, files: dict[str, Path], fixture_controller: Callable[..., Any]
 ) -> None:
@@ -140,6 +141,7 @@ def test_what_a_stranger_says_that_it_follows_is_not_what_fixtures_follow(
         assert active_model(bus) == "mine"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_deploy_that_is_interrupted_from_outside_leaves_no_shadow(
     stack: LocalStack,

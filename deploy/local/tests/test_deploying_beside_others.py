@@ -43,6 +43,7 @@ def test_what_runs_under_a_name_of_an_earlier_up_is_nobodys_to_stop(
     assert cell.running == [other, "recognizer-2"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("refuses", [False, True])
 def test_one_that_runs_that_very_model_already_is_taken_and_left_as_it_is(
     cell: Cell,
@@ -97,6 +98,7 @@ def test_a_member_token_with_nobody_behind_it_is_no_reason_not_to_begin(
     assert fixture.active == "mine"
 
 
+@pytest.mark.long
 def test_a_fixture_that_does_not_answer_keeps_the_old_one_running_beside_the_new_one(
     cell: Cell,
     files: dict[str, Path],

@@ -230,6 +230,7 @@ def test_a_recording_of_another_version_of_the_contract_is_reported(
     assert not (tmp_path / "steps.csv").exists()
 
 
+@pytest.mark.long
 def test_a_recording_cut_at_any_byte_is_reported_and_leaves_nothing_half_written(
     hmcs: Run, take: Path, models: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -310,6 +311,7 @@ def test_damage_in_the_middle_is_reported_with_its_times_and_the_rest_is_used(
     assert hmcs("replay", str(bad)).returncode == 0
 
 
+@pytest.mark.long
 def test_steps_believed_without_all_evidence_are_counted_apart(
     hmcs: Run, said: list[Logged], models: dict[str, Path], tmp_path: Path
 ) -> None:

@@ -59,12 +59,14 @@ def train(folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
     return hmcs(folder, "train", "task.yaml", *files, "--output", "m.hmcs", "--no-report", *more)
 
 
+@pytest.mark.long
 def test_good_demonstrations_agree(folder: Path) -> None:
     done = hmcs(folder, "task", "check", "task.yaml", "take-0.csv", "take-1.csv")
     assert done.returncode == 0, done.stderr
     assert done.stdout == "task.yaml: in order: 2 gestemes, 2 states; 2 demonstrations agree\n"
 
 
+@pytest.mark.long
 def test_findings_about_demonstrations_are_printed_and_refuse_nothing(folder: Path) -> None:
     done = hmcs(folder, "task", "check", "task.yaml", "take-0.csv", "take-1.csv", "take-0.csv")
     assert done.returncode == 0, done.stderr
@@ -72,6 +74,7 @@ def test_findings_about_demonstrations_are_printed_and_refuse_nothing(folder: Pa
     assert done.stdout.endswith("2 demonstrations agree, apart from the findings above\n")
 
 
+@pytest.mark.long
 def test_both_refuse_what_no_hand_made_and_training_does_it_if_asked_to(folder: Path) -> None:
     file = folder / "take-1.csv"
     lines = file.read_text().splitlines()
@@ -89,6 +92,7 @@ def test_both_refuse_what_no_hand_made_and_training_does_it_if_asked_to(folder: 
     assert (folder / "m.hmcs").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["/dev/zero", "pipe", ".", "bomb.yaml"])
 def test_a_task_that_is_no_task_is_refused_at_once(folder: Path, name: str) -> None:
     subprocess.run(["mkfifo", folder / "pipe"], check=True)

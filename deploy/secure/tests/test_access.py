@@ -136,6 +136,7 @@ def test_a_role_hears_what_the_table_gives_it_and_nothing_else(sessions, counted
         subscriber.undeclare()
 
 
+@pytest.mark.long
 def test_a_role_answers_for_itself_alone(sessions, counted) -> None:
     operator, probes = sessions["operator"], list[Probe]()
     keys = {service: KEYS.rpc(service, "i", "health") for service in SERVICES}
@@ -158,6 +159,7 @@ def test_a_role_answers_for_itself_alone(sessions, counted) -> None:
     assert wrong(probes, "answers") == []
 
 
+@pytest.mark.long
 def test_a_role_is_present_as_itself_alone(sessions, counted) -> None:
     watcher, probes = sessions["console"], list[Probe]()
     keys = [KEYS.presence(service, "i") for service in SERVICES]
@@ -234,11 +236,13 @@ def test_a_message_larger_than_its_bound_does_not_pass_the_router(cell, sessions
 # --- strangers ------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_who_shows_no_certificate_gets_no_session(cell) -> None:
     with pytest.raises(zenoh.ZError):
         cell.open_with(cell.authority, None)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell_of_stranger", ["closed", "other"])
 def test_the_certificate_of_another_authority_gets_no_session(
     cell, tmp_path, cell_of_stranger
@@ -250,6 +254,7 @@ def test_the_certificate_of_another_authority_gets_no_session(
         cell.open_with(cell.authority, holder)
 
 
+@pytest.mark.long
 def test_an_expired_certificate_gets_no_session(cell) -> None:
     long_ago = utc_now() - timedelta(days=30)
     holder = issue(cell.authority, Identity("closed", "robot", "old"), long_ago, days=10)

@@ -142,6 +142,7 @@ def asked_of(data: bytes) -> list[str]:
     return [said["request_uuid"] for said in reported["messages"] if said["type"] == kind]
 
 
+@pytest.mark.long
 def test_a_still_hand_holds_on_as_long_as_its_page_shows_that_it_lives(
     make_cell: MakeCell,
 ) -> None:
@@ -191,6 +192,7 @@ def test_a_burst_of_a_browser_is_cut_and_its_last_position_and_release_come_thro
         cell.until(lambda: not cell.handles[-1][1].dead_man, "the release")
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:.* does not match annotation")
 def test_a_browser_that_tells_nonsense_of_its_handle_moves_nothing_and_breaks_nothing(
     make_cell: MakeCell,

@@ -173,6 +173,7 @@ def test_a_refusal_leaves_active_what_was_active(
     assert others.active == "old"
 
 
+@pytest.mark.long
 def test_a_recognizer_that_no_process_runs_is_not_activated(
     make_cell: MakeCell, make_process: MakeProcess
 ) -> None:

@@ -164,6 +164,7 @@ _READING = st.builds(
 )
 
 
+@pytest.mark.long
 @given(
     usual=st.sampled_from([STICK, POINTER]),
     scale_m_s=st.floats(0.01, 0.5),

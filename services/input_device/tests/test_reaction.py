@@ -138,6 +138,7 @@ def test_lets_go_after_the_reaction_time_waits_and_presses_again(fixture: bool) 
     assert_whole(run)
 
 
+@pytest.mark.long
 @given(st.sets(st.integers(55, 245), max_size=4))
 def test_no_motion_is_lost_and_nothing_jumps_whenever_the_robot_stops(ticks: set[int]) -> None:
     run = play({tick / RATE_HZ for tick in ticks})

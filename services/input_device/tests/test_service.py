@@ -73,6 +73,7 @@ def test_the_last_steps_are_reported_again_with_their_origins(play: MakeDesk) ->
         assert [step.index for step in reported.steps] == expected
 
 
+@pytest.mark.long
 def test_it_rests_until_it_is_asked_to_play_and_plays_as_often_as_asked(play: MakeDesk) -> None:
     desk = play(autoplay=False)
     desk.until(lambda: len(desk.motions) > 20, "samples at rest")

@@ -63,6 +63,7 @@ class Robot:
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("re_engage", [True, False])
 def test_operator_of_a_recording_lets_go_and_presses_again_when_the_robot_stands(
     play: MakeDesk, line: Demonstration, re_engage: bool
@@ -93,6 +94,7 @@ def test_operator_of_a_recording_lets_go_and_presses_again_when_the_robot_stands
             )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("source", ["recorded", "synthetic", "simulated"])
 @pytest.mark.parametrize("re_engage", [True, False])
 def test_a_stop_that_was_asked_for_holds_until_a_person_asks_to_play(

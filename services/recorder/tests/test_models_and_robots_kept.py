@@ -16,6 +16,7 @@ from support.recorder import Bench, denied, pumped
 from support.stack import Stack
 
 
+@pytest.mark.long
 def test_who_was_there_and_the_models_are_kept_with_a_recording(
     stack: Stack, tmp_path: Path
 ) -> None:

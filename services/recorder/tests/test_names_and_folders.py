@@ -117,6 +117,7 @@ def _due(bench: Bench) -> bool:
     return False
 
 
+@pytest.mark.long
 def test_labels_that_lie_where_a_recording_begins_are_reported(
     stack: Stack, tmp_path: Path
 ) -> None:

@@ -45,6 +45,7 @@ def test_no_finite_command_leads_beyond_a_limit(
     rig.simulation.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", ["puma560", "iiwa", "panda"])
 def test_the_ends_of_the_joints_ranges_hold_and_let_the_arm_come_back(
     bench: Any, robot: str
@@ -124,6 +125,7 @@ def test_a_joint_speed_limit_slows_the_whole_motion_without_turning_it(bench: An
     assert np.abs(made[[0, 3, 4, 5]]).max() < 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", ["puma560", "iiwa", "panda"])
 def test_the_tool_tracks_200_mm_per_s_within_3_mm_per_s_and_without_drift(
     bench: Any, robot: str, period_s: float
@@ -144,6 +146,7 @@ def test_the_tool_tracks_200_mm_per_s_within_3_mm_per_s_and_without_drift(
     assert abs(abs(end.orientation @ begun.orientation) - 1) < 1e-6
 
 
+@pytest.mark.long
 def test_a_redundant_arm_returns_to_its_posture_when_its_tool_returns(bench: Any) -> None:
     rig = bench("iiwa")
     begun = rig.simulation.read().joint_positions

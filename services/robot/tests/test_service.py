@@ -175,6 +175,7 @@ def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cel
     assert cell.robot.health() == (True, "following commands")
 
 
+@pytest.mark.long
 def test_silence_makes_it_stand_until_it_is_engaged_anew(cell: Cell) -> None:
     cell.engage(-0.1)
     cell.until(lambda s: s.stop == "stale_command")
@@ -202,6 +203,7 @@ def test_a_second_writer_is_refused_and_counted(cell: Cell) -> None:
     assert all(state.stop == "none" for state in cell.said)
 
 
+@pytest.mark.long
 def test_it_stops_when_asked_and_follows_again_after_a_new_engage(cell: Cell) -> None:
     cell.engage(-0.1)
     asker = cell.open("asker")
@@ -224,6 +226,7 @@ def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:
     assert away.contacts == ()
 
 
+@pytest.mark.long
 def test_what_is_no_command_is_refused_and_reported_as_the_reason(cell: Cell) -> None:
     bus = cell.open("broken")
     raw = bus._session.declare_publisher(bus.keys.command)
@@ -287,6 +290,7 @@ def test_a_control_process_that_ends_is_reported_and_ends_the_robot(cell: Cell) 
     assert cell.robot.health() == (False, "the control process has ended")
 
 
+@pytest.mark.long
 def test_a_robot_that_is_killed_leaves_no_control_process(router: str, task: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "hmcs_robot", "--router", router, "--task", str(task)]
@@ -304,6 +308,7 @@ def test_a_robot_that_is_killed_leaves_no_control_process(router: str, task: Pat
         process.wait()
 
 
+@pytest.mark.long
 def test_a_task_out_of_its_reach_ends_the_process_with_2_and_says_why(
     router: str, task: Path
 ) -> None:
@@ -324,6 +329,7 @@ def test_a_task_out_of_its_reach_ends_the_process_with_2_and_says_why(
     assert "Traceback" not in ended.stderr
 
 
+@pytest.mark.long
 def test_sigterm_ends_it_cleanly(router: str, task: Path) -> None:
     with (
         Bus.open(BusSettings(router=router), "observer", "test") as bus,

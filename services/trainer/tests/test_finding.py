@@ -120,6 +120,7 @@ def test_performances_in_one_recording_are_found_at_their_own_times(
     assert [label.state for label in labels_of(read(file))] == ["s1", "s2", "s3", "s4"] * 3
 
 
+@pytest.mark.long
 def test_what_was_found_trains_anew_to_the_same_accuracy(takes: list[str], tmp_path: Path) -> None:
     model = train(LINES.name, takes, tmp_path / "m.hmcs", find_states=True)
     task_file = tmp_path / "m.yaml"

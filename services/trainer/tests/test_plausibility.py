@@ -17,6 +17,7 @@ from support.carried import TASK, changed, serious, shown, texts, turned
 # --- no false alarms ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_what_people_drew_passes_without_a_word() -> None:
     task = load_task("human-shapes")
     assert task.drawings is not None

@@ -60,6 +60,7 @@ def written(path: Path, text: str) -> Reader:
     return read(path)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_a_page_has_the_same_elements_whatever_things_are_called(tmp_path: Path) -> None:
     plainly = written(tmp_path / "plain.html", "name")

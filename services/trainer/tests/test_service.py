@@ -58,6 +58,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         made.trainer.close()
 
 
+@pytest.mark.long
 def test_a_model_and_its_page_are_made_and_progress_is_reported(bench: Bench) -> None:
     assert "training mine" in bench.trainer._train(ASKED).detail
     with pytest.raises(RequestRefusedError, match="mine is being trained: wait"):
@@ -74,6 +75,7 @@ def test_a_model_and_its_page_are_made_and_progress_is_reported(bench: Bench) ->
     assert "mine" in bench.trainer.health()[1]
 
 
+@pytest.mark.long
 def test_a_training_that_cannot_succeed_says_why_and_the_next_one_may(bench: Bench) -> None:
     (bench.takes / "empty.csv").write_text("time_s,x_m,y_m,state\n0,0,0,secret\n")
     bench.trainer._train(ASKED.model_copy(update={"demonstrations": ("empty.csv",)}))
@@ -85,6 +87,7 @@ def test_a_training_that_cannot_succeed_says_why_and_the_next_one_may(bench: Ben
     bench.until("learning")
 
 
+@pytest.mark.long
 def test_a_training_is_canceled_without_a_trace(bench: Bench) -> None:
     with pytest.raises(RequestRefusedError, match="nothing is being trained"):
         bench.trainer._cancel(Ask())
@@ -95,6 +98,7 @@ def test_a_training_is_canceled_without_a_trace(bench: Bench) -> None:
     assert list(bench.folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_of_two_trainers_only_one_trains_a_model_of_a_name(bench: Bench) -> None:
     bus = bench.stack.open_bus("trainer", "there")
     with contextlib.closing(
@@ -110,6 +114,7 @@ def test_of_two_trainers_only_one_trains_a_model_of_a_name(bench: Bench) -> None
         assert "training mine" in bench.trainer._train(ASKED).detail
 
 
+@pytest.mark.long
 def test_states_are_found_when_asked_for(bench: Bench) -> None:
     corners = read_csv(find_task("lines-through-obstacles").with_suffix(".csv"))
     time_s = np.arange(0.0, corners.time_s[-1], 0.02)
@@ -152,6 +157,7 @@ def test_a_hidden_file_is_neither_read_nor_asked_to_be_there(bench: Bench, tmp_p
     assert bench.reported == []
 
 
+@pytest.mark.long
 def test_a_training_that_takes_too_long_is_given_up_and_the_next_one_may(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,7 @@ def trained(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_a_model_names_its_task_and_every_demonstration(trained):
     model = load_model(trained / "m.hmcs")
     assert model.name == "mine"

@@ -231,6 +231,7 @@ except connecting.BusUnavailableError:
 """
 
 
+@pytest.mark.long
 def test_a_process_that_ends_right_after_giving_up_ends_cleanly(spawn) -> None:
     process = spawn(GIVES_UP_AND_ENDS)
     assert process.wait(60) == 7, process.log.read_text()

@@ -194,6 +194,7 @@ def test_idle_connections_leave_room_for_new_sessions(free_endpoint, monkeypatch
             assert bus.connected
 
 
+@pytest.mark.long
 def test_a_connection_that_says_nothing_is_closed(free_endpoint, monkeypatch) -> None:
     monkeypatch.setattr(config, "ACCEPTING_MS", 100)
     with open_router(free_endpoint):

@@ -149,6 +149,7 @@ def test_a_timer_slower_than_its_period_leaves_a_service_answering_and_ending(
     assert process.wait(30) == 0
 
 
+@pytest.mark.long
 def test_a_service_whose_loop_hangs_still_says_so_itself(spawn, router, join, until) -> None:
     hung = PROBE.replace('raise RuntimeError("boom")', "time.sleep(600)")
     process = spawn(hung, "--router", router, "--cell", "test", "--instance", "p")
@@ -163,6 +164,7 @@ def test_a_service_whose_loop_hangs_still_says_so_itself(spawn, router, join, un
     process.kill()
 
 
+@pytest.mark.long
 def test_a_service_of_the_table_declares_nothing_that_the_table_does_not_give_it(
     spawn, router
 ) -> None:

@@ -251,6 +251,7 @@ def test_what_unpacks_to_too_much_is_refused_before_it_is_unpacked(
     assert "times those of the file" in refused(tmp_path, content)
 
 
+@pytest.mark.long
 def test_a_bomb_that_lies_about_its_size_unpacks_to_no_more_than_it_says(
     parts: Parts, tmp_path: Path
 ) -> None:
@@ -288,6 +289,7 @@ def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:
         load_model(tmp_path / "m.hmcs")
 
 
+@pytest.mark.long
 @settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
 def test_a_file_damaged_anywhere_is_refused_or_still_the_model_it_was(

@@ -226,6 +226,7 @@ def test_files_of_one_name_are_left_out_one_by_one(task, performances):
     np.testing.assert_array_equal(ours.parameters.exit_weights, theirs.parameters.exit_weights)
 
 
+@pytest.mark.long
 def test_a_gesteme_of_hundreds_of_steps_is_recognized_to_its_end(task, performances):
     task = Task.model_validate({**task.model_dump(), "dead_zone_m": 7e-4})
     shown = resampled(performances(["along", "round", "up"], 0), 6)

@@ -52,6 +52,7 @@ def again(tmp_path: Path, model: Model) -> Callable[..., tuple[Replay, FixtureRe
 Again = Callable[..., tuple[Replay, FixtureReplay]]
 
 
+@pytest.mark.long
 def test_with_the_same_beliefs_it_does_what_it_did(said: list[Logged], again: Again) -> None:
     replay, fixture = again(said)
     assert compared(replay).same_bits == len(replay.beliefs) > 60
@@ -129,6 +130,7 @@ def test_without_a_recorded_robot_nobody_knows_how_far_it_was_beside(
     assert any(tick.now.guides for tick in fixture.ticks)
 
 
+@pytest.mark.long
 def test_a_new_start_of_the_input_device_is_a_new_hand(
     said: list[Logged], again: Again, model: Model
 ) -> None:

@@ -68,6 +68,7 @@ ZEROS = bytes(60 * 1024 * 1024)
 BOMB = zstandard.compress(ZEROS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("made", "says"),
     [
@@ -106,6 +107,7 @@ def _far_window() -> bytes:
     return with_size.compress(b"0123456789") + with_size.flush()
 
 
+@pytest.mark.long
 def test_bombs_take_little_memory_and_an_end(tmp_path: Path) -> None:
     path = file_of(tmp_path / "bombs.mcap", chunk(BOMB, len(ZEROS), "zstd") * 200)
     grown = grown_mb("from hmcs.recordings.reading import read", "read(sys.argv[1])", path)

@@ -77,6 +77,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", list(WORK))
 def test_a_large_recording_takes_little_memory(large: Path, tmp_path: Path, what: str) -> None:
     prepared, work = WORK[what]

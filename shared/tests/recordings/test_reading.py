@@ -53,6 +53,7 @@ def whole_chunks(data: bytes, cut: int) -> int:
     return count
 
 
+@pytest.mark.long
 def test_a_recording_cut_at_any_byte_opens_and_gives_all_its_whole_chunks(
     maker: Maker, performed: Callable[..., list[Said]], tmp_path: Path
 ) -> None:

@@ -22,6 +22,7 @@ from support.asked import CELL, Asked, announce, process
 Eventually = Callable[[Callable[[], Any]], Any]
 
 
+@pytest.mark.long
 def test_robots_that_hang_keep_no_robot_moving(
     router: str,
     observer: Bus,

@@ -106,6 +106,7 @@ def test_both_approaches_name_the_same_coin(head):
         assert np.log(ends[1] / ends[2]) == pytest.approx(left[0] - left[1])
 
 
+@pytest.mark.long
 def test_the_coin_is_named_as_often_as_the_tosses_allow():
     """Nobody does better than who knows the 50 tosses of the other coin; the model comes close."""
     rng = np.random.default_rng(2)
