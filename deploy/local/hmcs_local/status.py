@@ -98,12 +98,14 @@ def remarks(now: Observation, before: Observation | None) -> list[str]:
 
 
 def show_status(bus: Bus, console: Console, *, once: bool) -> bool:
-    """Show the table, anew every second until Ctrl-C; with `once`, after two looks.
+    """Show the table, anew every second until Ctrl-C; once, after two looks, if `once`.
+
+    A console that is no terminal shows it once as well.
 
     Returns whether somebody is there, everybody is healthy and every model that is followed is run.
     """
     before, now = None, observe(bus)
-    if once:
+    if once or not console.is_terminal:
         before, now = now, _look_again(bus, _LOOK_EVERY_S / 2)
         console.print(_picture(bus, now, before, console.width))
         well = all(s.health and s.health.healthy for s in now.sightings)

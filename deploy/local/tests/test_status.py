@@ -87,6 +87,12 @@ def run(bus: Bus, model: str) -> Token:
     return bus.announce(bus.keys.member(model, "my_recognizer", "r"))
 
 
+def test_where_there_is_no_terminal_it_is_shown_once(bus: Bus) -> None:
+    file = io.StringIO()
+    assert not show_status(bus, Console(file=file, width=160), once=False)
+    assert file.getvalue().count("nobody is there") == 1
+
+
 def test_the_table_shows_who_is_there(
     bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually
 ) -> None:

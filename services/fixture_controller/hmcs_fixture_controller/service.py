@@ -40,7 +40,7 @@ from hmcs.fixtures.controller.controller import Controller
 from hmcs.fixtures.controller.interface import Fixture, Guides
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model_file import asked_model, load_model
 from hmcs.translation import guides_of
 from hmcs_fixture_controller.models import Loaded, Recognizers, load_models
 from hmcs_fixture_controller.settings import FixtureControllerSettings
@@ -302,7 +302,7 @@ class FixtureController(Service):
         return Done(detail=self.activate(asked.model))
 
     def _on_load_model(self, asked: LoadModel) -> Done:
-        return Done(detail=self.load(Path(asked.path)))
+        return Done(detail=self.load(asked_model(asked.path)))
 
     def _take_over(self, model: Model, guides: Guides) -> str:
         followed = self._recognizers.get(self._controller.active)

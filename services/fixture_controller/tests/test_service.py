@@ -177,6 +177,17 @@ def test_a_model_file_that_cannot_be_used_is_refused_and_nothing_changes(
     assert cell.service.facts()["models"].startswith("lines ")
 
 
+@pytest.mark.parametrize("name", ["there.txt", "nowhere.txt", ""])
+def test_of_a_file_that_is_no_model_nobody_on_the_bus_learns_whether_it_exists(
+    make_cell: MakeCell, make_model: MakeModel, tmp_path: Path, name: str
+) -> None:
+    cell = make_cell(models=(make_model(),))
+    (tmp_path / "there.txt").write_text("secret")
+    path = str(tmp_path / name)
+    refusal = cell.ask("load_model", LoadModel(path=path), Done)
+    assert f"{path!r}: not a model: name a file that ends in .hmcs" in str(refusal)
+
+
 def test_a_model_to_follow_that_is_not_there_is_a_users_mistake(
     make_cell: MakeCell, make_model: MakeModel
 ) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from hmcs.bus.messages import Done, LoadModel
 from hmcs.bus.service import Service
@@ -16,7 +15,7 @@ from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.verbs import LOAD_MODEL
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model_file import asked_model, load_model
 from hmcs.recognition.registry import recognizer_of
 from hmcs_recognizer.hosted import Hosted
 from hmcs_recognizer.settings import RecognizerSettings
@@ -76,7 +75,7 @@ class RecognizerService(Service):
 
         Raises ModelFileError where it cannot be used, RequestRefusedError for one too many.
         """
-        model = load_model(Path(asked.path), verify=signed_by(self.settings.model_key))
+        model = load_model(asked_model(asked.path), verify=signed_by(self.settings.model_key))
         known = self.bus.in_loop(lambda: self._hosted.get(model.name))
         if known is not None:
             fresh = recognizer_of(model, anywhere=True)

@@ -100,6 +100,16 @@ def model_files(place: Path) -> list[Path]:
     return files
 
 
+def asked_model(path: str) -> Path:
+    """Return the path of a model file that somebody on the bus names.
+
+    Raises ModelFileError for any other kind of file: whether it exists is nobody's business there.
+    """
+    if not path.endswith(".hmcs"):
+        raise ModelFileError(f"{path!r}: not a model: name a file that ends in .hmcs")
+    return Path(path)
+
+
 def load_model(path: str | Path, *, verify: Callable[[Path, bytes], None] | None = None) -> Model:
     """Read a model file; see `model_archive` for the bounds of what is read.
 

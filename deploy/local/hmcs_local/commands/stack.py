@@ -89,8 +89,8 @@ def status(
 ) -> None:
     """Show who is there, how each is, rates, losses and the active model, and whether it is run.
 
-    With --once, the exit code is 0 when somebody is there, everybody is healthy and somebody runs
-    the model that is followed, else 1.
+    With --once, or where the output is no terminal, it is shown once, and the exit code is 0 when
+    somebody is there, everybody is healthy and somebody runs the model that is followed, else 1.
     """
     from hmcs_local.connecting import open_observer
     from hmcs_local.status import show_status
