@@ -60,6 +60,8 @@ def run_study(
         drawn = ", ".join(each.name for each in STUDIES if each.picture)
         raise UserError(f"--picture: study {name!r} has none; those that have: {drawn}")
     console = Console(stderr=True)
+    if absent := study.left_out(settings):
+        console.print(absent, highlight=False)
     try:
         with progress_shown(console, name, trials or study.trials) as report_progress:
             result = measure(

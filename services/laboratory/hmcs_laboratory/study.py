@@ -69,6 +69,8 @@ class Study(Generic[Settings]):
     """How many are made by default."""
     tiny: Mapping[str, str] = field(default_factory=dict)
     """Settings with which a trial takes a second or so."""
+    left_out: Callable[[Settings], str] = lambda _: ""
+    """Returns a line about methods that this machine lacks the libraries for; empty where none."""
     table: tuple[str, ...] = ()
     """The columns of its table, where there are more than fit; all where empty."""
     picture: str = ""

@@ -13,6 +13,7 @@ from hmcs.errors import UserError
 from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import CurveSettings
 from hmcs_laboratory.data.synthetic_tasks import TaskSettings, five_states
+from hmcs_laboratory.methods import registered
 from hmcs_laboratory.methods.features import directions, shape_and_length
 from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols
 from hmcs_laboratory.methods.online import followed, learned
@@ -198,6 +199,21 @@ def test_online_peers_give_probabilities_and_look_at_nothing_to_come(method):
     (beginning,) = followed(able, [part]).beliefs
     np.testing.assert_array_equal(beginning, belief[:20])
     assert (belief.argmax(axis=1) == performance.states).mean() > 0.8
+
+
+def test_of_all_methods_those_of_missing_libraries_are_left_out_and_named(monkeypatch):
+    monkeypatch.setattr(registered, "installed", lambda library: library != "aeon")
+    names = [method.name for method in registered.whole(())]
+    assert "dtw-1nn" not in names
+    assert {"hmmlearn-gaussian", "lda"} <= set(names)
+    assert registered.peers_left_out(()) == (
+        "left out, not installed: dtw-1nn (aeon), minirocket (aeon); `make peers` installs all"
+    )
+    # What is asked for by name is not passed over.
+    assert [method.name for method in registered.whole(("dtw-1nn",))] == ["dtw-1nn"]
+    assert not registered.peers_left_out(("dtw-1nn",))
+    monkeypatch.setattr(registered, "installed", lambda library: True)
+    assert not registered.peers_left_out(())
 
 
 def test_a_missing_library_is_reported_with_what_installs_it(monkeypatch, data):

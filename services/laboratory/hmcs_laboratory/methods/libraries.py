@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from hmcs.errors import UserError
+
+
+def installed(library: str) -> bool:
+    """Return whether a peer's library can be imported."""
+    return find_spec(library) is not None
 
 
 def peer(module: str) -> Any:

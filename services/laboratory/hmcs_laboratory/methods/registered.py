@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from hmcs_laboratory.methods.hmm_library import fit_gaussian, fit_symbols, prepare
+from hmcs_laboratory.methods.libraries import installed
 from hmcs_laboratory.methods.online import OnlineMethod
 from hmcs_laboratory.methods.online_peers import (
     learn_concatenated_hmm,
@@ -30,11 +31,35 @@ WHOLE = (
         whole_only=True,
     ),
     *SYMBOL_METHODS,
-    WholeMethod("hmmlearn-gaussian", "hmmlearn GaussianHMM on directions", fit_gaussian, prepare),
-    WholeMethod("hmmlearn-categorical", "hmmlearn CategoricalHMM on symbols", fit_symbols, prepare),
-    WholeMethod("dtw-1nn", "aeon DTW, nearest neighbor on positions", fit_dtw, prepare_dtw, True),
     WholeMethod(
-        "minirocket", "aeon MiniRocketClassifier on positions", fit_rocket, prepare_rocket, True
+        "hmmlearn-gaussian",
+        "hmmlearn GaussianHMM on directions",
+        fit_gaussian,
+        prepare,
+        library="hmmlearn",
+    ),
+    WholeMethod(
+        "hmmlearn-categorical",
+        "hmmlearn CategoricalHMM on symbols",
+        fit_symbols,
+        prepare,
+        library="hmmlearn",
+    ),
+    WholeMethod(
+        "dtw-1nn",
+        "aeon DTW, nearest neighbor on positions",
+        fit_dtw,
+        prepare_dtw,
+        whole_only=True,
+        library="aeon",
+    ),
+    WholeMethod(
+        "minirocket",
+        "aeon MiniRocketClassifier on positions",
+        fit_rocket,
+        prepare_rocket,
+        whole_only=True,
+        library="aeon",
     ),
     WholeMethod("svm", "scikit-learn SVC on 12 points and log length", fit_svm, whole_only=True),
     WholeMethod("lda", "scikit-learn shrinkage LDA on the same", fit_lda, whole_only=True),
@@ -111,8 +136,19 @@ OnlineNames = Annotated[tuple[str, ...], AfterValidator(_known_online)]
 
 
 def whole(names: tuple[str, ...]) -> tuple[WholeMethod, ...]:
-    """Return the methods of those names, or all for none."""
-    return tuple(method for method in WHOLE if not names or method.name in names)
+    """Return the methods of those names; for none all whose libraries are installed."""
+    if names:
+        return tuple(method for method in WHOLE if method.name in names)
+    return tuple(method for method in WHOLE if not method.library or installed(method.library))
+
+
+def peers_left_out(names: tuple[str, ...]) -> str:
+    """Return a line that names what `whole` leaves out of all methods; empty where nothing."""
+    absent = [method for method in WHOLE if method not in whole(names)] if not names else []
+    if not absent:
+        return ""
+    methods = ", ".join(f"{method.name} ({method.library})" for method in absent)
+    return f"left out, not installed: {methods}; `make peers` installs all"
 
 
 def online(names: tuple[str, ...]) -> tuple[OnlineMethod, ...]:

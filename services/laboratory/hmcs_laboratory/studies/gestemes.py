@@ -8,7 +8,7 @@ import numpy as np
 
 from hmcs_laboratory.data.gestemes import GestemeSet, performed, random_references
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Share
-from hmcs_laboratory.methods.registered import WholeNames, whole
+from hmcs_laboratory.methods.registered import WholeNames, peers_left_out, whole
 from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.study import Measured, Scalar, Study, seed_from, stream_of
 
@@ -156,6 +156,10 @@ def _measured(
     ]
 
 
+def _left_out(settings: _Settings) -> str:
+    return peers_left_out(settings.methods)
+
+
 _TINY = {"test": "2", "methods": "hmcs-gestemes,lda"}
 
 PEERS = Study(
@@ -164,6 +168,7 @@ PEERS = Study(
     f"{SOURCE}; hmmlearn, aeon, scikit-learn",
     PeersSettings,
     noise_trial,
+    left_out=_left_out,
     tiny={
         "gestemes": "4",
         "training": "3",
@@ -178,6 +183,7 @@ NOISE = Study(
     f"{SOURCE}, figs 4.3 and 4.4",
     NoiseSettings,
     noise_trial,
+    left_out=_left_out,
     tiny={**_TINY, "gestemes": "4", "noise": "0.1,0.3"},
 )
 GESTEME_COUNT = Study(
@@ -186,6 +192,7 @@ GESTEME_COUNT = Study(
     f"{SOURCE}, figs 4.5 and 4.6",
     GestemeCountSettings,
     gesteme_count_trial,
+    left_out=_left_out,
     tiny={**_TINY, "gestemes": "2,4"},
 )
 TRAINING_COUNT = Study(
@@ -194,6 +201,7 @@ TRAINING_COUNT = Study(
     f"{SOURCE}, figs 4.7 and 4.8",
     TrainingCountSettings,
     training_count_trial,
+    left_out=_left_out,
     tiny={**_TINY, "gestemes": "4", "training": "1,3"},
 )
 PARTIAL = Study(
@@ -202,5 +210,6 @@ PARTIAL = Study(
     SOURCE,
     PartialSettings,
     partial_trial,
+    left_out=_left_out,
     tiny={**_TINY, "gestemes": "3", "training": "3"},
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from hmcs_laboratory.data.gestemes import performed, random_references
 from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative
-from hmcs_laboratory.methods.registered import WholeNames, whole
+from hmcs_laboratory.methods.registered import WholeNames, peers_left_out, whole
 from hmcs_laboratory.methods.symbol_hmms import SYMBOL_METHODS, with_symbols
 from hmcs_laboratory.methods.whole import measured_on
 from hmcs_laboratory.study import Measured, Study, seed_from, stream_of
@@ -56,6 +56,7 @@ SYMBOL_COUNT = Study(
     "Aarno 2007, 4.2.1, figs 4.9 and 4.10",
     SymbolCountSettings,
     symbol_count_trial,
+    left_out=lambda settings: peers_left_out(settings.methods),
     tiny={
         "gestemes": "3",
         "training": "2",
