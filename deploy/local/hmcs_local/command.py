@@ -37,6 +37,7 @@ app.add_typer(task_app, name="task")
 app.add_typer(secure_app, name="secure")
 
 _IN_ORDER_OF_HELP = (
+    task.new,
     stack.up,
     stack.status,
     recognizers.swap,

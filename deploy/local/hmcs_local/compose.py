@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -54,6 +54,8 @@ class StackSpec:
     path: Path
     services: Mapping[str, ServiceSpec]
     """By name, each after the services it needs."""
+    variables: frozenset[str]
+    """Names of the variables it takes from the environment."""
 
     def select(self, names: tuple[str, ...]) -> tuple[ServiceSpec, ...]:
         """Return the named services in starting order; raises ComposeError for an unknown name."""
@@ -125,11 +127,12 @@ def load_compose(path: Path, variables: Mapping[str, str]) -> StackSpec:
     specs = {name: _spec(path, name, service, awaited) for name, service in filled.items()}
     order = TopologicalSorter({name: spec.needs for name, spec in specs.items()})
     try:
-        return StackSpec(path, {name: specs[name] for name in order.static_order()})
+        in_order = {name: specs[name] for name in order.static_order()}
     except CycleError as error:
         raise ComposeError(f"{path}: services wait for each other: {error.args[1]}") from None
     except KeyError as error:
         raise ComposeError(f"{path}: a service depends on {error}, which is not there") from None
+    return StackSpec(path, in_order, frozenset(_named(document)))
 
 
 def _spec(path: Path, name: str, service: dict[str, Any], awaited: set[str]) -> ServiceSpec:
@@ -177,6 +180,15 @@ def _fill(node: Any, variables: Mapping[str, str]) -> Any:
     if isinstance(node, str):
         return _VARIABLE.sub(lambda match: _value(match, variables), node)
     return node
+
+
+def _named(node: Any) -> Iterator[str]:
+    """Yield the variables that are named anywhere in a document."""
+    if isinstance(node, dict | list):
+        for each in node.values() if isinstance(node, dict) else node:
+            yield from _named(each)
+    elif isinstance(node, str):
+        yield from (match["name"] for match in _VARIABLE.finditer(node) if match["name"])
 
 
 def _value(match: re.Match[str], variables: Mapping[str, str]) -> str:

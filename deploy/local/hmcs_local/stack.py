@@ -47,7 +47,8 @@ class LocalStack:
     `services` are those to start (None: all); the router is among them and embedded unless it is
     left out, then the one at `router` is joined. Services that others wait for (one-shots) run to
     their end first, within `__enter__`. `scale` overrides how many instances a service has,
-    `environment` adds to the environment of a service, by service name. `router` may end in `:0`:
+    `environment` adds to the environment of a service, by service name; a variable that is None
+    there is left out. `router` may end in `:0`:
     a free port is chosen and `stack.router` tells it. Every volume of compose.yaml is a folder of
     `folder`, which also holds `logs/INSTANCE.log`. `variables` fill in `${NAME}` in compose.yaml
     and default to this process' environment; HMCS_* variables reach the services no other way.
@@ -69,7 +70,7 @@ class LocalStack:
         scale: Mapping[str, int] | None = None,
         router: str = DEFAULT_ROUTER,
         folder: Path = DEFAULT_FOLDER,
-        environment: Mapping[str, Mapping[str, str]] | None = None,
+        environment: Mapping[str, Mapping[str, str | None]] | None = None,
         variables: Mapping[str, str] | None = None,
         open_to_network: bool = False,
         closed: ClosedCell | None = None,
@@ -287,7 +288,7 @@ class LocalStack:
         if named and self._closed is not None:
             closed = self._closed.environment(spec.name.replace("-", "_"), instance)
         composed = {key: self._local(spec, value) for key, value in spec.environment.items()}
-        return {
+        given = {
             "OMP_NUM_THREADS": "1",
             **inherited,
             **composed,
@@ -296,6 +297,7 @@ class LocalStack:
             **self._environment.get(spec.name, {}),
             **more,
         }
+        return {key: value for key, value in given.items() if value is not None}
 
     def _local(self, spec: ServiceSpec, text: str) -> str:
         for inside, volume in spec.volumes.items():

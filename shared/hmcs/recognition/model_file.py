@@ -85,15 +85,15 @@ def save_model(model: Model, path: str | Path) -> Model:
     return model
 
 
-def model_files(place: Path) -> list[Path]:
+def model_files(place: Path, *, may_be_empty: bool = False) -> list[Path]:
     """Return a model file, or those of a folder of `*.hmcs` files by name.
 
-    Raises UserError for a folder without any.
+    Raises UserError for a folder without any, unless it may be empty.
     """
     if not place.is_dir():
         return [place]
     files = sorted(place.glob("*.hmcs"))
-    if not files:
+    if not files and not may_be_empty:
         raise UserError(
             f"{place}: no model file (*.hmcs) in this folder: make one with `hmcs train`"
         )

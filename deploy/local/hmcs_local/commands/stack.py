@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,35 @@ from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
 
 
 def up(
+    task: Annotated[
+        str | None,
+        typer.Argument(
+            help="Your task: a file (`hmcs new` writes one), or the name of one that comes along. "
+            "Without one: the demo of compose.yaml.",
+        ),
+    ] = None,
+    demonstrations: Annotated[
+        list[str] | None,
+        typer.Argument(help="Of the task, as `hmcs train` takes them: learned from first."),
+    ] = None,
+    task_option: Annotated[
+        str | None, typer.Option("--task", metavar="TASK", help="The same as TASK.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="What recognizes the task from the start.")
+    ] = None,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="What moves the hand: page (the default with a task), recorded, simulated, "
+            "synthetic, gamepad, spacemouse, keyboard, mouse.",
+        ),
+    ] = None,
+    recognizer: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="What to learn from the demonstrations for."),
+    ] = None,
     services: Annotated[
         str,
         typer.Option(
@@ -49,12 +79,17 @@ def up(
         ),
     ] = False,
 ) -> None:
-    """Run the stack of compose.yaml as processes here, with the router embedded.
+    """Run the whole stack as processes here, with the router embedded: page, robot, recognition.
 
-    With --secure every process comes with its certificate, and the router refuses everybody else.
-    Ctrl-C ends them all. `${NAME}` in compose.yaml is taken from the environment.
+    With a task and neither demonstrations nor a model it waits to be taught on the page, and what
+    is trained and activated there is followed at once. With --secure every process comes with its
+    certificate, and the router refuses everybody else. Ctrl-C ends them all. `${NAME}` in
+    compose.yaml is taken from the environment.
     """
+    from hmcs_local.bringing_up import Wanted, arrangement_of
+    from hmcs_local.compose import find_compose, load_compose
     from hmcs_local.launcher import run_up
+    from hmcs_local.own_task import unheard
     from hmcs_secure.closed_cell import find_closed_cell
     from hmcs_secure.router_file import DEFAULT_LISTEN
 
@@ -65,10 +100,25 @@ def up(
         router = DEFAULT_LISTEN
     chosen = tuple(name.strip() for name in services.split(",") if name.strip())
     console = Console(highlight=False, soft_wrap=True)
+    spec = load_compose(compose or find_compose(Path.cwd()), os.environ)
+    for name in unheard(os.environ, spec.variables | _OWN_VARIABLES):
+        console.print(
+            f"hmcs: {name} in the environment reaches no process: {spec.path} says what each is "
+            "given; `hmcs up --help` lists what can be changed"
+        )
+    arrangement = arrangement_of(
+        spec,
+        folder,
+        Wanted(
+            _one_task(task, task_option), tuple(demonstrations or ()), model, source, recognizer
+        ),
+        typer.echo,
+    )
     code = run_up(
         lambda while_waiting: LocalStack(
             compose,
-            services=chosen or None,
+            services=chosen or arrangement.services,
+            environment=arrangement.environment,
             scale=dict(_scale(item) for item in scale or []),
             router=router,
             folder=folder,
@@ -120,6 +170,18 @@ def router(
     words += ["--config", str(config)] if config else []
     words += ["--open-to-network"] if open_to_network else []
     raise typer.Exit(run_router(words))
+
+
+_OWN_VARIABLES = frozenset(
+    {"HMCS_ROUTER", "HMCS_CELL", "HMCS_SECURE", "HMCS_OPEN_TO_NETWORK", "HMCS_INSTANCE"}
+)
+"""Read by commands, not by services."""
+
+
+def _one_task(argument: str | None, option: str | None) -> str | None:
+    if argument is not None and option is not None:
+        raise UserError(f"--task {option}: the task {argument} is given already: name one of them")
+    return argument or option
 
 
 def _scale(item: str) -> tuple[str, int]:

@@ -1,10 +1,42 @@
-"""Work with task files: `task check`."""
+"""Work with task files: `new`, `task check`."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 import typer
+
+from hmcs.errors import UserError
+from hmcs_local.new_task import PLACES, PLANES, STATES, task_name_of, write_new_task
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="Of the task, or its file; NAME.yaml is written.")],
+    states: Annotated[
+        str, typer.Option(metavar="A,B,…", help="Parts of the task, in their order.")
+    ] = ",".join(STATES),
+    robot: Annotated[
+        str, typer.Option(metavar="NAME", help=f"Which arm: {', '.join(PLACES)}.")
+    ] = "puma560",
+    plane: Annotated[
+        str | None,
+        typer.Option(metavar="PLANE", help="The motion lies in a plane: xy, xz or yz."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a task file to begin with, every field explained; nothing is asked.
+
+    `hmcs up NAME.yaml` then brings the stack up to teach it on the page.
+    """
+    file = task_name_of(name)
+    parts = [part.strip() for part in states.split(",") if part.strip()]
+    if not parts:
+        raise UserError("--states: name one at least, e.g. --states approach,insert,retract")
+    chosen = next((each for each in PLANES if each == plane), None)
+    if plane is not None and chosen is None:
+        raise UserError(f"--plane {plane}: expected one of {', '.join(PLANES)}")
+    write_new_task(file, parts, robot, chosen, force=force)
+    typer.echo(f"{file}: a task of {len(parts)} states; bring it up with `hmcs up {file}`")
 
 
 def check(

@@ -39,11 +39,13 @@ class Guide(NamedTuple):
 
 
 def load_models(places: Iterable[Path]) -> tuple[Model, ...]:
-    """Return the models in files, and in folders of `*.hmcs` files.
+    """Return the models in files, and in folders of `*.hmcs` files; a folder may fill later.
 
-    Raises ModelFileError for a file that cannot be used, UserError for a folder without files.
+    Raises ModelFileError for a file that cannot be used.
     """
-    return tuple(load_model(file) for place in places for file in model_files(place))
+    return tuple(
+        load_model(file) for place in places for file in model_files(place, may_be_empty=True)
+    )
 
 
 def task_of(name: str | None, models: tuple[Model, ...]) -> Task | None:

@@ -1,0 +1,136 @@
+"""`hmcs new`: a task file to begin with, every field of it explained where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from hmcs.bus.keys import KeyNameError, check_name
+from hmcs.errors import UserError
+from hmcs.task import check_task
+from hmcs.task.model import unknown_name_message
+from hmcs.whole_files import written_whole
+
+Plane = Literal["xy", "xz", "yz"]
+PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
+STATES = ("approach", "work", "retract")
+
+
+class Place(NamedTuple):
+    """Where an arm that comes along begins, its tool along +x, and the room about it, m."""
+
+    start_m: tuple[float, float, float]
+    lower_m: tuple[float, float, float]
+    upper_m: tuple[float, float, float]
+
+
+PLACES = {
+    "puma560": Place((0.60, 0.0, 0.45), (0.45, -0.30, 0.25), (0.75, 0.30, 0.70)),
+    "iiwa": Place((0.60, 0.0, 0.45), (0.45, -0.30, 0.25), (0.70, 0.30, 0.65)),
+    "panda": Place((0.50, 0.0, 0.45), (0.35, -0.25, 0.25), (0.60, 0.25, 0.65)),
+}
+"""By the arm's name."""
+
+
+def write_new_task(
+    file: Path, states: Sequence[str], robot: str, plane: Plane | None, *, force: bool = False
+) -> None:
+    """Write a task file whose name is the file's, without its ending.
+
+    Raises UserError for a file that is there already (unless `force`), an unknown robot, and names
+    that no task can have.
+    """
+    if file.exists() and not force:
+        raise UserError(f"{file}: is there already: choose another name, or --force to replace it")
+    if robot not in PLACES:
+        raise UserError(f"--robot: {unknown_name_message('robot', robot, tuple(PLACES))}")
+    for state in states:
+        try:
+            check_name("state", state)
+        except KeyNameError as error:
+            raise UserError(f"--states: {error}") from error
+    if len(set(states)) < len(states):
+        raise UserError(f"--states: {', '.join(states)}: expected every state once")
+    text = task_text(file.stem, states, robot, plane)
+    try:
+        with written_whole(file) as written:
+            written.write_text(text, encoding="utf-8")
+            problems = check_task(written)
+            if problems:
+                raise UserError("\n".join(f"{each.path}: {each.message}" for each in problems))
+    except OSError as error:
+        raise UserError(f"{file}: cannot be written: {error.strerror}") from error
+
+
+def task_text(name: str, states: Sequence[str], robot: str, plane: Plane | None) -> str:
+    """Return a task file with one gesteme for each state, in the order given."""
+    place = PLACES[robot]
+    gestemes = "\n".join(f"  - {{name: {state}}}" for state in states)
+    following = [*states[1:], None]
+    chain = "\n".join(
+        f"  - {{name: {state}, gestemes: [{state}], next: [{after or ''}]}}"
+        for state, after in zip(states, following, strict=True)
+    )
+    axes = ", ".join(plane or "xyz")
+    return f"""\
+# A task: its parts in their order, the room it is done in, and the robot that does it. Only what
+# stands without a # in front counts. `hmcs task check {name}.yaml` names every mistake.
+format: hmcs-task/1
+name: {name}
+description: ""
+
+# The hand makes a step whenever it has moved so far. Smaller: recognized sooner, disturbed by
+# tremor; some hundredths of the shortest part are good.
+dead_zone_m: 0.008
+
+# Gestemes are motion primitives, each one meaningful piece of motion. Several states may share one.
+gestemes:
+{gestemes}
+
+# States are the parts of the task as you think of it. `next` lists what may follow, [] ends the
+# task; {{a: 0.8, b: 0.2}} gives probabilities.
+states:
+{chain}
+
+# States the task may begin in.
+start: [{states[0]}]
+
+recognition:
+  # Which axes of the robot's base frame (x forward, y left, z up) carry the motion. Two of them for
+  # what is done in a plane, e.g. [x, y] on a table.
+  axes: [{axes}]
+
+workspace:
+  # The tool stays in this box, base frame, m.
+  lower_m: {list(place.lower_m)}
+  upper_m: {list(place.upper_m)}
+  # Bodies the arm must not touch: box (size_m), sphere (radius_m) or cylinder (radius_m, length_m).
+  obstacles: []
+  #  - {{name: table, shape: box, position_m: [0.70, 0.0, 0.10], size_m: [0.60, 1.00, 0.05]}}
+  # Where the tool is never let: plane (normal), sphere, box, capsule or mesh (file, STL or OBJ).
+  forbidden: []
+  #  - {{name: tabletop, shape: plane, position_m: [0, 0, 0.28], normal: [0, 0, 1]}}
+
+robot:
+  model: {robot}  # one of {", ".join(PLACES)}
+  # Where the tool begins, m, and how it is turned; it keeps it. This one looks forward.
+  tool_start_m: {list(place.start_m)}
+  tool_orientation_xyzw: [0.0, 0.7071067811865476, 0.0, 0.7071067811865476]
+  tool_radius_m: 0.0  # it is kept out of forbidden regions as a ball of this size
+  speed_limit_m_s: 0.25
+  angular_speed_limit_rad_s: 0.5
+
+fixture:
+  law: general  # at the operator's own speed; `thesis` slows down while unsure
+  compliance: insistence  # lets go of a hand that insists; or belief, fixed, cue
+  maximum_factor: 0.83  # 0.5 leaves the hand free, 1 lets it go nowhere but along the path
+  pull: 0.5  # how strongly a robot beside the learned path is led back to it; 0 for not at all
+  operator_scale: 1.0  # m of the robot for a m of the hand
+"""
+
+
+def task_name_of(name: str) -> Path:
+    """Return the file of a new task, with the ending of task files."""
+    file = Path(name)
+    return file if file.suffix in (".yaml", ".yml") else file.with_name(f"{file.name}.yaml")
