@@ -88,6 +88,7 @@ def up(
     """
     from hmcs_local.bringing_up import Wanted, arrangement_of
     from hmcs_local.compose import find_compose, load_compose
+    from hmcs_local.demonstration_files import expanded
     from hmcs_local.launcher import run_up
     from hmcs_local.own_task import unheard
     from hmcs_secure.closed_cell import find_closed_cell
@@ -106,14 +107,9 @@ def up(
             f"hmcs: {name} in the environment reaches no process: {spec.path} says what each is "
             "given; `hmcs up --help` lists what can be changed"
         )
-    arrangement = arrangement_of(
-        spec,
-        folder,
-        Wanted(
-            _one_task(task, task_option), tuple(demonstrations or ()), model, source, recognizer
-        ),
-        typer.echo,
-    )
+    named, files = _one_task(task, task_option), tuple(expanded(demonstrations or ()))
+    wanted = Wanted(named, files, model, source, recognizer)
+    arrangement = arrangement_of(spec, folder, wanted, typer.echo)
     code = run_up(
         lambda while_waiting: LocalStack(
             compose,

@@ -52,13 +52,14 @@ def check(
     """
     from hmcs.fixtures.regions.workspace import check_workspace
     from hmcs.task import load_task
+    from hmcs_local.demonstration_files import expanded
     from hmcs_trainer.training import checked
 
     task = load_task(file)
     check_workspace(file, task)
     shown = ""
     if demonstrations:
-        count, findings = checked(task, demonstrations, typer.echo)
+        count, findings = checked(task, expanded(demonstrations), typer.echo)
         shown = f"; {count} demonstrations agree" + (
             ", apart from the findings above" if findings else ""
         )

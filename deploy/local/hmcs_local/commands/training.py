@@ -17,7 +17,8 @@ def train(
     demonstrations: Annotated[
         list[str],
         typer.Argument(
-            help="CSV files, MCAP recordings, lasa:SHAPE/NUMBER, lasa:SHAPE/FIRST-LAST."
+            help="CSV files, MCAP recordings, folders of them, patterns, lasa:SHAPE/NUMBER, "
+            "lasa:SHAPE/FIRST-LAST."
         ),
     ],
     output: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
@@ -64,6 +65,7 @@ def train(
     taken for each other, how far demonstrations lay apart, and what would help. States that are
     found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
+    from hmcs_local.demonstration_files import expanded
     from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
 
@@ -71,7 +73,7 @@ def train(
     with fits_shown(bool(alternatives)) as fits:
         model = learn(
             task,
-            demonstrations,
+            expanded(demonstrations),
             output,
             name=name,
             recognizer=recognizer,

@@ -1,0 +1,51 @@
+"""Demonstrations as they are named on a command line: files, folders, patterns, drawings."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from pathlib import Path
+
+from hmcs.errors import UserError
+from hmcs.recordings.file_rotation import SUFFIX as RECORDING
+from hmcs_trainer.references import DRAWINGS
+
+ENDINGS = (".csv", RECORDING)
+"""Of demonstrations in a folder."""
+LABELS = ".labels.csv"
+"""Ending of files that hold the labels of a recording beside them."""
+
+
+def expanded(references: Sequence[str]) -> list[str]:
+    """Return references with folders and patterns replaced by the files they stand for, by name.
+
+    A file that is named twice is left in twice: training says so. Raises UserError for a folder or
+    a pattern without demonstrations.
+    """
+    return [file for reference in references for file in _files_of(reference)]
+
+
+def _files_of(reference: str) -> list[str]:
+    path = Path(reference)
+    if reference.startswith(DRAWINGS) or path.is_file():
+        return [reference]
+    if path.is_dir():
+        files = [str(file) for file in sorted(path.iterdir()) if _is_demonstration(file)]
+        if not files:
+            raise UserError(
+                f"{reference}: no demonstration ({' or '.join('*' + each for each in ENDINGS)}) in "
+                "this folder"
+            )
+        return files
+    if glob.has_magic(reference):
+        # Path.glob takes no absolute patterns.
+        named = glob.glob(reference)  # noqa: PTH207
+        files = sorted(each for each in named if not each.endswith(LABELS))
+        if not files:
+            raise UserError(f"{reference}: no file is named like this")
+        return files
+    return [reference]
+
+
+def _is_demonstration(file: Path) -> bool:
+    return file.is_file() and file.name.endswith(ENDINGS) and not file.name.endswith(LABELS)
