@@ -14,6 +14,8 @@ from hmcs.bus.messages import (
     LastSteps,
     LastStepsQuestion,
     LoadModel,
+    ModelFile,
+    ModelQuestion,
     Motion,
     Outline,
     OutlineQuestion,
@@ -29,7 +31,8 @@ from hmcs.bus.qos import QOS_PROFILES, QosProfile
 
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
-    ActivateRecognizer, RobotDescription, Record, Train, OutlineQuestion, Outline, SetLabels, Done,
+    ModelQuestion, ModelFile, ActivateRecognizer, RobotDescription, Record, Train, OutlineQuestion,
+    Outline, SetLabels, Done,
 }  # fmt: skip
 
 

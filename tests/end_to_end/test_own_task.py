@@ -17,6 +17,7 @@ from hmcs.bus.messages import Belief, FixtureState, Train, TrainingProgress
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import TRAIN
 from hmcs.errors import UserError
+from hmcs.recognition.model_file import load_model
 from hmcs.recognizer_takeover import activate, load_into_fixture, load_into_recognizer
 from hmcs_local.connecting import open_operator
 from hmcs_local.stack import with_free_port
@@ -190,3 +191,35 @@ def test_without_a_model_the_stack_waits_to_be_taught_and_follows_what_is_activa
 
     wait_until(guided, "guidance in all three states")
     assert beliefs
+
+
+def test_a_second_host_has_its_models_from_the_one_that_has_them(
+    tmp_path: Path, started: Callable[..., None], joined: Callable[[str], Bus]
+) -> None:
+    shutil.copy(DATA / "reach-and-lift.yaml", tmp_path / "mine.yaml")
+    model = tmp_path / "robots-host" / "reach-and-lift.hmcs"
+    model.parent.mkdir()
+    hmcs(tmp_path, "train", "mine.yaml", *HANDS[:2], "--output", model, "--no-report")
+    router = with_free_port("tcp/127.0.0.1:0")
+    with_router = ("--router", router, "--folder", model.parent)
+    here = "router,fixture-controller,robot"
+    words = ("mine.yaml", "--model", model, "--services", here, *with_router)
+    started(("-m", "hmcs_local.command", "up", *words))
+    bus = joined(router)
+
+    def present(*services: str) -> bool:
+        bus.pump(0.05)
+        return all(bus.present(bus.keys.presence(service)).members for service in services)
+
+    wait_until(lambda: present("fixture_controller"), "the fixture controller")
+    other = tmp_path / "other-host"
+    compose = (Path(__file__).parents[2] / "compose.yaml").read_text(encoding="utf-8")
+    (tmp_path / "compose.yaml").write_text(compose.replace("human-shapes.hmcs", model.name))
+    started(
+        (
+            *("-m", "hmcs_local.command", "up", "--compose", tmp_path / "compose.yaml"),
+            *("--services", "gesteme-classifier,task-hmm", "--router", router, "--folder", other),
+        )
+    )
+    wait_until(lambda: present("gesteme_classifier", "task_hmm"), "recognition on the other host")
+    assert load_model(other / "models" / model.name).hash == load_model(model).hash

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -27,6 +28,7 @@ ROUTER_IN_COMPOSE = "tcp/router:7447"
 """Where the services of compose.yaml look for the router; here it is the launcher's own."""
 DEFAULT_FOLDER = Path("out/up")
 _ONE_SHOT_LOOK_S = 0.05
+_MODEL_VARIABLES = ("HMCS_MODEL", "HMCS_MODELS")
 
 
 class StackError(UserError):
@@ -55,7 +57,9 @@ class LocalStack:
     `open_to_network` lets the embedded router listen beyond this machine without TLS. `closed` is
     the closed cell this is: every process comes with its certificate, and the router, at a tls
     endpoint, refuses everybody else.
-    `while_waiting` is called again and again while a one-shot runs.
+    `while_waiting` is called again and again while a one-shot runs. `fetch` is called with the
+    router and the model files that the services begin with and nobody here makes, where they are
+    not there.
 
     Raises ComposeError, StackError, AuthorityError and RouterError for what the user can mend, and
     OneShotFailedError where a one-shot does not end with 0. Not for use from several threads: the
@@ -75,6 +79,7 @@ class LocalStack:
         open_to_network: bool = False,
         closed: ClosedCell | None = None,
         while_waiting: Callable[[], None] = lambda: None,
+        fetch: Callable[[str, Sequence[Path]], None] = lambda _router, _files: None,
     ) -> None:
         path = compose or find_compose(Path.cwd())
         self.spec: StackSpec = load_compose(path, os.environ if variables is None else variables)
@@ -98,6 +103,7 @@ class LocalStack:
             self.spec.service(name)
         self._open_to_network = open_to_network
         self._while_waiting = while_waiting
+        self._fetch = fetch
         self._asked: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {}
         self._router_session: zenoh.Session | None = None
         self._numbers: dict[str, int] = {}
@@ -124,6 +130,8 @@ class LocalStack:
         """Start the router, run the one-shots, start every service: the order of compose.yaml."""
         if self.spec.services[ROUTER] in self._chosen:
             self.start_router()
+        if missing := self._missing_models():
+            self._fetch(self.router, missing)
         for spec in self._chosen:
             if spec.one_shot:
                 self._run_one_shot(spec)
@@ -229,6 +237,18 @@ class LocalStack:
         folder.mkdir(parents=True, exist_ok=True)
         return folder
 
+    def _missing_models(self) -> list[Path]:
+        """The model files of the services to start that are not there, unless a one-shot runs."""
+        if any(spec.one_shot for spec in self._chosen):
+            return []
+        named = [
+            Path(word)
+            for spec in self._chosen
+            for variable in _MODEL_VARIABLES
+            for word in _model_files(self._local_environment(spec, "", {}).get(variable, ""))
+        ]
+        return [file for file in dict.fromkeys(named) if not file.exists()]
+
     def _run_one_shot(self, spec: ServiceSpec) -> None:
         before = self._models_of(spec)
         process = self.start(spec.name)
@@ -304,6 +324,12 @@ class LocalStack:
             here = str(self.volume(volume)).replace("\\", r"\\")
             text = re.sub(rf"(?<![\w./-]){re.escape(inside)}(?![\w.-])", here, text)
         return text.replace(ROUTER_IN_COMPOSE, self.router)
+
+
+def _model_files(text: str) -> list[str]:
+    """The model files in a setting: one, or a JSON list of files and folders."""
+    words = json.loads(text) if text.startswith("[") else [text]
+    return [word for word in words if word.endswith(".hmcs")]
 
 
 def with_free_port(endpoint: str) -> str:

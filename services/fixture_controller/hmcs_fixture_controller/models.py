@@ -10,7 +10,7 @@ from hmcs.bus.service import UserError
 from hmcs.fixtures.controller.interface import Guides
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model, model_files
+from hmcs.recognition.model_file import ModelFileError, load_model, model_files
 
 MOST_LENT = 32
 """So many recognizers of other names may stand on loaded models; the oldest one goes first."""
@@ -21,6 +21,8 @@ class Loaded(NamedTuple):
 
     model: Model
     guides: Guides
+    file: Path
+    """Where the model was read."""
 
 
 class Recognizers(dict[str, Loaded]):
@@ -58,17 +60,35 @@ class Recognizers(dict[str, Loaded]):
         return [oldest]
 
 
-def load_models(places: Iterable[Path], model_key: Path | None = None) -> dict[str, Model]:
-    """Return the models in files, and in folders of `*.hmcs` files, by name.
+def content_of(loaded: Loaded) -> bytes:
+    """Return the file of a loaded model as it is on disk.
+
+    Raises ModelFileError where it cannot be read any more, or holds another model by now.
+    """
+    contents: list[bytes] = []
+    model = load_model(loaded.file, verify=lambda _, content: contents.append(content))
+    if model.hash != loaded.model.hash:
+        raise ModelFileError(
+            f"{loaded.file}: holds another model now than the one that is loaded: load it, or name "
+            "the file it was"
+        )
+    return contents[0]
+
+
+def load_models(
+    places: Iterable[Path], model_key: Path | None = None
+) -> dict[str, tuple[Model, Path]]:
+    """Return the models in files, and in folders of `*.hmcs` files, by name, each with its file.
 
     Raises ModelFileError for a file that cannot be used, UserError for a folder without files and
     for two different models of one name.
     """
-    models: dict[str, Model] = {}
+    models: dict[str, tuple[Model, Path]] = {}
     for place in places:
         for file in model_files(place):
             model = load_model(file, verify=signed_by(model_key))
-            if models.setdefault(model.name, model).hash != model.hash:
+            known, _ = models.setdefault(model.name, (model, file))
+            if known.hash != model.hash:
                 raise UserError(
                     f"{file}: a second, different model named {model.name!r}: leave one of them "
                     "out, or train it under another name"

@@ -25,6 +25,8 @@ from hmcs.bus.messages import (
     LastStepsQuestion,
     LoadModel,
     Message,
+    ModelFile,
+    ModelQuestion,
     Motion,
     Origin,
     Pairing,
@@ -33,16 +35,15 @@ from hmcs.bus.messages import (
     Step,
 )
 from hmcs.bus.service import Service, UserError
-from hmcs.bus.session import Bus, Publisher, Received
-from hmcs.bus.verbs import ACTIVATE, LAST_STEPS, LOAD_MODEL
+from hmcs.bus.session import Bus, Publisher, Received, RequestRefusedError
+from hmcs.bus.verbs import ACTIVATE, LAST_STEPS, LOAD_MODEL, MODEL_FILE
 from hmcs.controller_feed import ControllerFeed
 from hmcs.fixtures.controller.controller import Controller
-from hmcs.fixtures.controller.interface import Fixture, Guides
+from hmcs.fixtures.controller.interface import Fixture
 from hmcs.model_signing import signed_by
-from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import asked_model, load_model
 from hmcs.translation import guides_of
-from hmcs_fixture_controller.models import Loaded, Recognizers, load_models
+from hmcs_fixture_controller.models import Loaded, Recognizers, content_of, load_models
 from hmcs_fixture_controller.settings import FixtureControllerSettings
 from hmcs_fixture_controller.speakers import Speakers
 from hmcs_fixture_controller.translation import command_of, state_of
@@ -76,8 +77,8 @@ class FixtureController(Service):
         self._paired: Pairing | None = None
         self._pairings: Publisher[Pairing] | None = None
         self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
-        for model in load_models(settings.models, settings.model_key).values():
-            self._adopt(model, guides_of(model))
+        for model, file in load_models(settings.models, settings.model_key).values():
+            self._adopt(Loaded(model, guides_of(model), file))
         if settings.active_model is not None:
             self._follow(settings.active_model)
         self._commands = bus.publisher(Command, bus.keys.command)
@@ -95,6 +96,7 @@ class FixtureController(Service):
         bus.subscribe(RobotState, bus.keys.robot_state, self._on_robot_state)
         ACTIVATE.answer(bus, self._on_activate)
         LOAD_MODEL.answer(bus, self._on_load_model, aside=self._files)
+        MODEL_FILE.answer(bus, self._on_model_question, aside=self._files)
         self._fetch_past_steps()
         bus.every(PAIRING_EVERY_S, self._say_pairing)
         self._watch_input()
@@ -281,8 +283,8 @@ class FixtureController(Service):
         over. Raises ModelFileError or RegionError where it cannot be used; nothing changes then.
         """
         model = load_model(path, verify=signed_by(self.settings.model_key))
-        guides = guides_of(model)
-        return self.bus.in_loop(lambda: self._take_over(model, guides))
+        loaded = Loaded(model, guides_of(model), path)
+        return self.bus.in_loop(lambda: self._take_over(loaded))
 
     def activate(self, name: str) -> str:
         """Follow a loaded recognizer from now on; return what is so now.
@@ -304,9 +306,17 @@ class FixtureController(Service):
     def _on_load_model(self, asked: LoadModel) -> Done:
         return Done(detail=self.load(asked_model(asked.path)))
 
-    def _take_over(self, model: Model, guides: Guides) -> str:
-        followed = self._recognizers.get(self._controller.active)
-        outcome = self._adopt(model, guides)
+    def _on_model_question(self, asked: ModelQuestion) -> ModelFile:
+        loaded = self.bus.in_loop(lambda: self._recognizers.get(asked.model))
+        if loaded is None:
+            raise RequestRefusedError(f"model {asked.model!r} is not loaded here")
+        return ModelFile(
+            model=loaded.model.name, model_hash=loaded.model.hash, content=content_of(loaded)
+        )
+
+    def _take_over(self, loaded: Loaded) -> str:
+        model, followed = loaded.model, self._recognizers.get(self._controller.active)
+        outcome = self._adopt(loaded)
         if followed is None or followed.model.task.name == model.task.name:
             return outcome
         before = followed.model.task.name
@@ -319,9 +329,10 @@ class FixtureController(Service):
             f"{before!r}: its guides and limits are those of its own task"
         )
 
-    def _adopt(self, model: Model, guides: Guides) -> str:
-        self._feed.load(model.name, guides)
-        self._recognizers.take(Loaded(model, guides))
+    def _adopt(self, loaded: Loaded) -> str:
+        model = loaded.model
+        self._feed.load(model.name, loaded.guides)
+        self._recognizers.take(loaded)
         self.log.info("model loaded", extra={"model": model.name, "hash": model.hash})
         return f"model {model.name} {model.hash} is loaded"
 

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hmcs.bus.messages import ActivateRecognizer, Done, LastSteps, LoadModel, RobotState, Step
+from hmcs.bus.messages import (
+    ActivateRecognizer,
+    Done,
+    LastSteps,
+    LoadModel,
+    ModelFile,
+    ModelQuestion,
+    RobotState,
+    Step,
+)
 from hmcs.bus.service import UserError
 from hmcs.recognition.model_file import load_model
 
@@ -175,6 +184,29 @@ def test_a_model_file_that_cannot_be_used_is_refused_and_nothing_changes(
     refusal = cell.ask("load_model", LoadModel(path=str(tmp_path / "none.hmcs")), Done)
     assert "no such model file" in str(refusal)
     assert cell.service.facts()["models"].startswith("lines ")
+
+
+def test_the_file_of_a_loaded_model_is_handed_over_whole(
+    make_cell: MakeCell, make_model: MakeModel
+) -> None:
+    file = make_model()
+    cell = make_cell(models=(file,))
+    answer = cell.ask("model_file", ModelQuestion(model="lines"), ModelFile)
+    assert answer.content == file.read_bytes()
+    assert answer.model_hash == load_model(file).hash
+    assert "model 'squares' is not loaded here" in str(
+        cell.ask("model_file", ModelQuestion(model="squares"), ModelFile)
+    )
+
+
+def test_a_file_that_holds_another_model_by_now_is_not_handed_over(
+    make_cell: MakeCell, make_model: MakeModel
+) -> None:
+    file = make_model()
+    cell = make_cell(models=(file,))
+    file.write_bytes(make_model("lines", folder="more", of_task="welding").read_bytes())
+    refusal = cell.ask("model_file", ModelQuestion(model="lines"), ModelFile)
+    assert "holds another model now than the one that is loaded" in str(refusal)
 
 
 @pytest.mark.parametrize("name", ["there.txt", "nowhere.txt", ""])

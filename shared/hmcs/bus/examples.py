@@ -21,6 +21,8 @@ from hmcs.bus.messages import (
     LastStepsQuestion,
     LoadModel,
     Message,
+    ModelFile,
+    ModelQuestion,
     Motion,
     Origin,
     Outline,
@@ -177,6 +179,8 @@ EXAMPLES: tuple[Message, ...] = (
     LastStepsQuestion(count=300, before=41),
     LastSteps(clock="5f0c1d2e3a4b", steps=(_STEP,), origins=(ORIGIN,)),
     LoadModel(path="/models/demo.hmcs"),
+    ModelQuestion(model="demo"),
+    ModelFile(model="demo", model_hash="1f2e3d4c5b6a7988", content=b"PK\x05\x06"),
     ActivateRecognizer(model="demo"),
     RobotDescription(
         robot="puma560",

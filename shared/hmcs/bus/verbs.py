@@ -22,6 +22,8 @@ from hmcs.bus.messages import (
     LastStepsQuestion,
     LoadModel,
     Message,
+    ModelFile,
+    ModelQuestion,
     Outline,
     OutlineQuestion,
     Record,
@@ -85,6 +87,9 @@ PLAY = Verb("play", ("input_device",), Ask, Done, "begins to play, or goes on af
 LOAD_MODEL = Verb(
     "load_model", ("recognizer", "fixture_controller"), LoadModel, Done, "works with a model file"
 )
+MODEL_FILE = Verb(
+    "model_file", ("fixture_controller",), ModelQuestion, ModelFile, "the file of a loaded model"
+)
 ACTIVATE = Verb(
     "activate", ("fixture_controller",), ActivateRecognizer, Done, "follows that recognizer"
 )
@@ -103,6 +108,7 @@ VERBS: tuple[Verb, ...] = (  # type: ignore[type-arg]
     LAST_STEPS,
     PLAY,
     LOAD_MODEL,
+    MODEL_FILE,
     ACTIVATE,
     LOOKS,
     STOP,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -88,8 +89,10 @@ def up(
     """
     from hmcs_local.bringing_up import Wanted, arrangement_of
     from hmcs_local.compose import find_compose, load_compose
+    from hmcs_local.connecting import open_operator
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.launcher import run_up
+    from hmcs_local.model_fetching import fetch_models
     from hmcs_local.own_task import unheard
     from hmcs_secure.closed_cell import find_closed_cell
     from hmcs_secure.router_file import DEFAULT_LISTEN
@@ -110,6 +113,16 @@ def up(
     named, files = _one_task(task, task_option), tuple(expanded(demonstrations or ()))
     wanted = Wanted(named, files, model, source, recognizer)
     arrangement = arrangement_of(spec, folder, wanted, typer.echo)
+
+    def fetch(router: str, files: Sequence[Path]) -> None:
+        if signed_models:
+            names = ", ".join(map(str, files))
+            raise UserError(f"{names}: not there: copy each with its signature (.sig) to this host")
+        cell = os.environ.get("HMCS_CELL") or "demo"
+        with open_operator(router, cell, secure) as bus:
+            for line in fetch_models(bus, files):
+                console.print(f"hmcs: {line}")
+
     code = run_up(
         lambda while_waiting: LocalStack(
             compose,
@@ -121,6 +134,7 @@ def up(
             open_to_network=open_to_network,
             closed=closed,
             while_waiting=while_waiting,
+            fetch=fetch,
         ),
         lambda who, what: console.print(_line(who, what)),
     )

@@ -20,7 +20,13 @@ from hmcs.bus.messages.fixture import ActivateRecognizer, Command, FixtureState,
 from hmcs.bus.messages.message import Envelope, Message, Origin, Source
 from hmcs.bus.messages.operator import Handle, Motion
 from hmcs.bus.messages.process import Ask, Description, Done, Health, Refusal, SettingsReport
-from hmcs.bus.messages.recognition import Belief, Evidence, LoadModel
+from hmcs.bus.messages.recognition import (
+    Belief,
+    Evidence,
+    LoadModel,
+    ModelFile,
+    ModelQuestion,
+)
 from hmcs.bus.messages.recording import Label, Outline, OutlineQuestion, Record, SetLabels
 from hmcs.bus.messages.robot import RobotDescription, RobotState, StopRequest
 from hmcs.bus.messages.steps import LastSteps, LastStepsQuestion, Step
@@ -44,6 +50,8 @@ __all__ = [
     "LastStepsQuestion",
     "LoadModel",
     "Message",
+    "ModelFile",
+    "ModelQuestion",
     "Motion",
     "Origin",
     "Outline",
@@ -83,6 +91,8 @@ MESSAGES: tuple[type[Message], ...] = (
     LastStepsQuestion,
     LastSteps,
     LoadModel,
+    ModelQuestion,
+    ModelFile,
     ActivateRecognizer,
     RobotDescription,
     Record,

@@ -83,3 +83,25 @@ class LoadModel(Message):
 
     path: str
     """Of the model file, as the asked process sees it."""
+
+
+class ModelQuestion(Message):
+    """Asks for the file of a model, to run it on another host."""
+
+    SCHEMA = "model_question"
+
+    model: Name
+    """Its name."""
+
+
+class ModelFile(Message):
+    """A model file, whole."""
+
+    SCHEMA = "model_file"
+
+    model: Name
+    """Its name."""
+    model_hash: Name
+    """Of what it has learned."""
+    content: bytes
+    """Of the file; to be validated as any file is."""
