@@ -9,7 +9,6 @@ states, M gestemes, F dimensions, T steps.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,14 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.motion.steps import Step
 from hmcs.recognition.checking import LEAST_SPREAD, check_shapes, check_spreads, check_within
-from hmcs.recognition.hmm.inference import shortest_path
+from hmcs.recognition.hmm.inference import shortest_path, smooth
 from hmcs.recognition.model import axes_of
+from hmcs.recognition.segmentation import (
+    StateSegment,
+    edges_where,
+    segments_between,
+    summed_by,
+)
 from hmcs.recognition.segments import Segment
 from hmcs.recognition.task_chain import TaskChain
 from hmcs.task import Task
@@ -63,17 +68,6 @@ class NetworkKnowledge(NamedTuple):
     """Unit in which each dimension is observed, shape (F,): 1 for directions, for the others their
     standard deviation over all demonstrations, 0.1 at least for the log of the length."""
     off_network: float
-
-
-class Piece(NamedTuple):
-    """One gesteme performed, as offline segmentation finds it."""
-
-    state: int
-    """Index of the task state."""
-    start: int
-    """Its first step."""
-    stop: int
-    """The step after its last."""
 
 
 class Network(NamedTuple):
@@ -190,19 +184,25 @@ class NetworkScores:
         return np.asarray(scores.log_emission(seen / self._scales[: len(seen)])[self._where])
 
 
-def pieces(network: Network, log_emission: Array) -> list[Piece]:
+def most_probable_segments(
+    network: Network, log_emission: Array, first: int
+) -> tuple[StateSegment, ...]:
     """Return the most probable segmentation of a motion of T ≥ 1 steps (Viterbi).
 
-    `log_emission` has shape (T, L). A state that follows itself makes two pieces.
+    `log_emission` has shape (T, L); `first` is the index of the first step. A state that follows
+    itself makes two segments.
     """
     path = shortest_path(network.initial, network.transition, log_emission).path
+    posterior = smooth(network.initial, network.transition, log_emission).states
     slot, within = network.slot[path], network.within[path]
     # Left-right HMMs never go back: a state of smaller index is another performance.
-    begins = np.flatnonzero((slot[1:] != slot[:-1]) | (within[1:] < within[:-1])) + 1
-    edges = [0, *begins.tolist(), len(path)]
-    return [
-        Piece(int(network.task_state[path[start]]), start, stop) for start, stop in pairwise(edges)
-    ]
+    return segments_between(
+        edges_where((slot[1:] != slot[:-1]) | (within[1:] < within[:-1])),
+        network.task_state[path],
+        network.gesteme[path],
+        summed_by(network.task_state, posterior, int(network.task_state.max()) + 1),
+        first,
+    )
 
 
 def _leaving(hmms: GestemeHmms, lengths: Sequence[float]) -> Array:

@@ -19,6 +19,7 @@ from hmcs.recognition.checking import LARGEST, check_shapes, check_spreads, chec
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
+from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.step_features import step_features
 from hmcs.recognition.task_chain import chain_of
@@ -36,7 +37,7 @@ from hmcs_baselines.slots import (
     SlotFilter,
     check_slot_chain,
     learn_slot_chain,
-    most_probable_states,
+    most_probable_segments,
 )
 from hmcs_baselines.svm import SvmSettings
 
@@ -99,13 +100,13 @@ class ForceRecognizer:
         return self._filter.step(step.index, np.log(categories)[self._chain.slot_gesteme])
 
 
-def segment(model: Model, steps: Sequence[Step]) -> Integers:
-    """Return the task state of each step of a whole motion, by Viterbi, shape (T,)."""
+def segment(model: Model, steps: Sequence[Step], anywhere: bool) -> tuple[StateSegment, ...]:
+    """Return the segments of a whole motion, one step at least, by Viterbi."""
     known, chain = model.knowledge, chain_of(model.task)
-    if not steps:
-        return np.zeros(0, dtype=np.int64)
     log_emission = np.log(category_likelihoods(known, steps))[:, chain.slot_gesteme]
-    return most_probable_states(chain, known.chain, log_emission)
+    return most_probable_segments(
+        chain, known.chain, log_emission, steps[0].index, anywhere=anywhere
+    )
 
 
 def category_likelihoods(known: ForceTask, steps: Sequence[Step]) -> Array:
@@ -186,4 +187,5 @@ KIND = RecognizerSpec(
     learn=_learn,
     recognizer=_recognizer,
     check=_check,
+    segment=segment,
 )

@@ -24,6 +24,7 @@ from hmcs.recognition.hmm.emissions import log_gaussians
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
+from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.step_features import (
     Sensors,
@@ -39,7 +40,7 @@ from hmcs_baselines.slots import (
     SlotFilter,
     check_slot_chain,
     learn_slot_chain,
-    most_probable_states,
+    most_probable_segments,
     slot_rows,
 )
 
@@ -101,13 +102,13 @@ class GaussianTaskHmmRecognizer:
         return self._filter.step(step.index, slot_log_emission(self._hmm, row[None])[0])
 
 
-def segment(model: Model, steps: Sequence[Step]) -> Integers:
-    """Return the task state of each step of a whole motion, by Viterbi, shape (T,)."""
+def segment(model: Model, steps: Sequence[Step], anywhere: bool) -> tuple[StateSegment, ...]:
+    """Return the segments of a whole motion, one step at least, by Viterbi."""
     hmm: GaussianTaskHmm = model.knowledge
-    if not steps:
-        return np.zeros(0, dtype=np.int64)
-    rows = step_features(steps, hmm.sensors, model.axes)
-    return most_probable_states(chain_of(model.task), hmm.chain, slot_log_emission(hmm, rows))
+    log_emission = slot_log_emission(hmm, step_features(steps, hmm.sensors, model.axes))
+    return most_probable_segments(
+        chain_of(model.task), hmm.chain, log_emission, steps[0].index, anywhere=anywhere
+    )
 
 
 def slot_log_emission(hmm: GaussianTaskHmm, rows: Array) -> Array:
@@ -173,4 +174,5 @@ KIND = RecognizerSpec(
     learn=_learn,
     recognizer=_recognizer,
     check=_check,
+    segment=segment,
 )

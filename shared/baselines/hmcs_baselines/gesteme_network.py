@@ -11,37 +11,29 @@ from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
+from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.task_chain import chain_of
 from hmcs_baselines.concatenated import (
     Network,
     NetworkKnowledge,
     NetworkScores,
     NetworkSettings,
-    Piece,
     check_network,
     joined,
     learn_network,
-    pieces,
+    most_probable_segments,
 )
 from hmcs_baselines.hmm.bank import ForwardBank
 
 
-def segment(model: Model, steps: Sequence[Step], *, anywhere: bool = False) -> list[Piece]:
-    """Return the pieces of a whole motion: (state, start, stop) by the index of the step.
+def segment(model: Model, steps: Sequence[Step], anywhere: bool) -> tuple[StateSegment, ...]:
+    """Return the segments of a whole motion, one step at least, by Viterbi: what the paper does.
 
-    This is what the paper does. With `anywhere` the motion may begin in any state.
-    Raises ValueError where there are no steps.
+    With `anywhere` the motion may begin in any state.
     """
-    if not steps:
-        raise ValueError("no steps to segment: give one at least")
     network, scores = _network(model, anywhere)
-    first = steps[0].index
-    return [
-        Piece(state, first + start, first + stop)
-        for state, start, stop in pieces(
-            network, np.stack([scores.log_emission(step) for step in steps])
-        )
-    ]
+    log_emission = np.stack([scores.log_emission(step) for step in steps])
+    return most_probable_segments(network, log_emission, steps[0].index)
 
 
 class GestemeNetwork:
@@ -87,4 +79,5 @@ KIND = RecognizerSpec(
     learn=_learn,
     recognizer=_recognizer,
     check=check_network,
+    segment=segment,
 )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
+from hmcs.recognition.segmentation import StateSegment
 from hmcs_baselines.classifying import Gestemes
 from hmcs_baselines.restarting import CusumSettings
 from hmcs_baselines.two_levels import (
@@ -16,6 +19,7 @@ from hmcs_baselines.two_levels import (
     TwoLevels,
     check_two_levels,
     learn_two_levels,
+    segment_two_levels,
 )
 
 
@@ -25,6 +29,10 @@ def _learn(data: TrainingData) -> TwoLevels:
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return TwoLevelRecognizer(model, anywhere=anywhere)
+
+
+def _segment(model: Model, steps: Sequence[Step], anywhere: bool) -> tuple[StateSegment, ...]:
+    return segment_two_levels(model, steps, anywhere=anywhere)
 
 
 def _from_gestemes_alone(plain: Any) -> Any:
@@ -50,6 +58,7 @@ KIND = RecognizerSpec(
     learn=_learn,
     recognizer=_recognizer,
     check=check_two_levels,
+    segment=_segment,
 )
 FOURIER = KIND._replace(
     name="fourier",
@@ -64,5 +73,6 @@ ONLINE_NETWORK = KIND._replace(
     settings=partial(
         LayeredHmmSettings, observations="direction", restart="network", evidence="none"
     ),
+    segment=None,
     from_older=_from_gestemes_alone,
 )

@@ -15,8 +15,14 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import check_distributions, check_shapes
-from hmcs.recognition.hmm.inference import shortest_path
+from hmcs.recognition.hmm.inference import shortest_path, smooth
 from hmcs.recognition.recognizer import Recognition
+from hmcs.recognition.segmentation import (
+    StateSegment,
+    edges_where,
+    segments_between,
+    summed_by,
+)
 from hmcs.recognition.segments import Segment
 from hmcs.recognition.task_chain import TaskChain
 from hmcs_baselines.hmm.bank import ForwardBank
@@ -105,15 +111,23 @@ class SlotFilter:
         return self._beliefs.recognition(index, joint.sum(axis=1), joint, log_likelihood)
 
 
-def most_probable_states(chain: TaskChain, slots: SlotChain, log_emission: Array) -> Integers:
-    """Return the task state of each step on the most probable path of slots, shape (T,).
+def most_probable_segments(
+    chain: TaskChain, slots: SlotChain, log_emission: Array, first: int, *, anywhere: bool
+) -> tuple[StateSegment, ...]:
+    """Return the segments on the most probable path of slots (Viterbi), its first step `first`.
 
-    Given log P(step | slot), shape (T, K).
+    Given log P(step | slot), shape (T, K). With `anywhere` the path may begin in any state.
     """
-    if not len(log_emission):
-        return np.zeros(0, dtype=np.int64)
-    path = shortest_path(slots.initial, slots.transition, log_emission).path
-    return np.asarray(chain.slot_state[path], dtype=np.int64)
+    initial = _anywhere(chain) if anywhere else slots.initial
+    path = shortest_path(initial, slots.transition, log_emission).path
+    posterior = smooth(initial, slots.transition, log_emission).states
+    return segments_between(
+        edges_where(path[1:] != path[:-1]),
+        chain.slot_state[path].astype(np.int64),
+        chain.slot_gesteme[path].astype(np.int64),
+        summed_by(chain.slot_state.astype(np.int64), posterior, len(chain.initial)),
+        first,
+    )
 
 
 def check_slot_chain(slots: SlotChain, count: int) -> None:

@@ -5,18 +5,22 @@ Shapes: M gestemes, S task states, T steps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from hmcs.arrays import Array
+from hmcs.errors import UserError
 from hmcs.motion.steps import Step
 from hmcs.recognition.belief_builder import BeliefBuilder
 from hmcs.recognition.checking import LARGEST, check_within
+from hmcs.recognition.hmm.inference import shortest_path, smooth
+from hmcs.recognition.hmm.log_transitions import log_of
 from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.registry import TrainingData
+from hmcs.recognition.segmentation import StateSegment, edges_where, segments_between
 from hmcs.recognition.segments import LabeledSteps, labeled_steps
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
@@ -156,6 +160,44 @@ class TwoLevelRecognizer:
         return self._beliefs.recognition(
             step.index, states, cells, log_likelihood, classification.start
         )
+
+
+def segment_two_levels(
+    model: Model, steps: Sequence[Step], *, anywhere: bool
+) -> tuple[StateSegment, ...]:
+    """Return the segments of a whole motion, one step at least, by Viterbi in the task HMM.
+
+    The gesteme level passes up what it does online. With `anywhere` the motion may begin in any
+    state. Raises UserError where there is no task HMM, or where gesteme HMMs are to be restarted by
+    a pedal that no step was marked with.
+    """
+    knowledge: TwoLevels = model.knowledge
+    task_hmm = knowledge.task
+    if task_hmm is None:
+        raise UserError(
+            f"model {model.name!r} has no task HMM (evidence=none), and no offline segmentation "
+            "without one: train it with --set evidence=winner"
+        )
+    if knowledge.restart == "given" and not any(step.mark for step in steps[1:]):
+        raise UserError(
+            f"model {model.name!r} has its gesteme HMMs restarted by the pedal, and the motion has "
+            "no mark of it: train with --set restart=network"
+        )
+    classifier = GestemeHmmClassifier(
+        knowledge.gestemes, model.axes, knowledge.restart, knowledge.cusum
+    )
+    passed = np.array([passed_up(classifier.step(step), knowledge.evidence) for step in steps])
+    states = len(task_hmm.initial)
+    initial = np.full(states, 1.0 / states) if anywhere else task_hmm.initial
+    log_emission = log_of(passed @ task_hmm.gestemes.T)
+    path = shortest_path(initial, task_hmm.transition, log_emission).path
+    posterior = smooth(initial, task_hmm.transition, log_emission).states
+    # Of a state's own gestemes the likeliest is performed, whatever mistakes the level below makes.
+    own = gesteme_shares(chain_of(model.task), passed.shape[1])[path] > 0
+    gestemes = np.where(own, passed, -1.0).argmax(axis=1)
+    return segments_between(
+        edges_where(path[1:] != path[:-1]), path, gestemes, posterior, steps[0].index
+    )
 
 
 def _marked(labeled: LabeledSteps) -> Iterator[Step]:

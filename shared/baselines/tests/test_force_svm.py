@@ -14,7 +14,7 @@ from hmcs.recognition.hmm import inference
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, save_model
-from hmcs.recognition.registry import kind_named, recognizer_of
+from hmcs.recognition.registry import kind_named, recognizer_of, segmentation_of
 from hmcs.recognition.segments import LearningError, labeled_steps, segments_of
 from hmcs.task import Task
 from hmcs_baselines.estimators import SupportVectors
@@ -22,7 +22,6 @@ from hmcs_baselines.force_svm import (
     Components,
     ForceSettings,
     category_likelihoods,
-    segment,
 )
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
@@ -74,15 +73,16 @@ def test_the_filter_is_the_forward_algorithm_with_categories_shared() -> None:
 def test_viterbi_segments_a_performance_into_sub_tasks_that_share_a_category() -> None:
     model = taught()
     labeled = labeled_steps(model.task, performed(32))
-    found = segment(model, labeled.steps)
-    assert (found == labeled.states).mean() > 0.95
-    assert [int(q) for q in found[np.flatnonzero(np.diff(found, prepend=-1))]] == [0, 1, 2, 3]
-    assert segment(model, ()).shape == (0,)
+    found = segmentation_of(model, labeled.steps)
+    assert [each.state for each in found] == [0, 1, 2, 3]
+    states = np.repeat([each.state for each in found], [each.stop - each.start for each in found])
+    assert (states == labeled.states).mean() > 0.95
+    assert min(each.probability for each in found) > 0.8
 
 
 def test_the_force_decides_however_the_hand_moves() -> None:
     still = [step._replace(displacement=np.ones(3)) for step in steps_performed(33)]
-    np.testing.assert_array_equal(segment(taught(), still), segment(taught(), steps_performed(33)))
+    assert segmentation_of(taught(), still) == segmentation_of(taught(), steps_performed(33))
 
 
 def test_components_that_are_not_looked_at_do_not_matter() -> None:
@@ -93,7 +93,7 @@ def test_components_that_are_not_looked_at_do_not_matter() -> None:
     for step in steps_performed(34):
         assert step.wrench is not None
         changed.append(step._replace(wrench=np.where(np.arange(6) == 2, step.wrench, 99.0)))
-    np.testing.assert_array_equal(segment(model, changed), segment(model, steps_performed(34)))
+    assert segmentation_of(model, changed) == segmentation_of(model, steps_performed(34))
     with pytest.raises(LearningError, match="switch one on"):
         taught(TEXT._replace(components=Components(*(False,) * 6)))
 
@@ -142,7 +142,7 @@ def test_a_saved_model_runs_without_scikit_learn(tmp_path: Path) -> None:
         "import sys; sys.modules['sklearn'] = None; import numpy as np\n"
         "from hmcs.motion.steps import Step\n"
         "from hmcs.recognition.model_file import load_model\n"
-        "from hmcs.recognition.registry import recognizer_of\n"
+        "from hmcs.recognition.registry import recognizer_of, segmentation_of\n"
         "recognizer = recognizer_of(load_model(sys.argv[1]))\n"
         "step = Step(0, np.zeros(3), np.ones(3), None, np.array([4.0, 0, 0, 0, 0, 0]))\n"
         "print(recognizer.step(step).belief.states.argmax())\n"

@@ -11,14 +11,13 @@ from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.registry import recognizer_of, segmentation_of
 from hmcs.recognition.segments import LearningError, Segment, labeled_steps
 from hmcs.recognition.step_features import Sensors, StepFeatureReader, step_features
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from hmcs_baselines.gaussian_task_hmm import (
     GaussianTaskHmmSettings,
-    segment,
     slot_log_emission,
 )
 from hmcs_baselines.slots import learn_slot_chain
@@ -116,10 +115,11 @@ def test_a_state_never_left_by_the_task_is_not_left_without_backtracking() -> No
 def test_viterbi_finds_the_segments_of_a_performance() -> None:
     model, demonstration = taught(), performed(77)
     labeled = labeled_steps(model.task, demonstration)
-    found = segment(model, labeled.steps)
-    assert (found == labeled.states).mean() > 0.95
-    assert [int(q) for q in found[np.flatnonzero(np.diff(found, prepend=-1))]] == [0, 1, 2, 3]
-    assert segment(model, ()).shape == (0,)
+    found = segmentation_of(model, labeled.steps)
+    assert [each.state for each in found] == [0, 1, 2, 3]
+    states = np.repeat([each.state for each in found], [each.stop - each.start for each in found])
+    assert (states == labeled.states).mean() > 0.95
+    assert min(each.probability for each in found) > 0.8
 
 
 def test_a_sensor_that_falls_silent_is_left_out() -> None:

@@ -11,7 +11,8 @@ from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.registry import recognizer_of, segmentation_of
+from hmcs.recognition.segmentation import label_of
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from hmcs_baselines.concatenated import (
@@ -21,7 +22,6 @@ from hmcs_baselines.concatenated import (
     joined,
 )
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings
-from hmcs_baselines.gesteme_network import segment
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 USUAL = NetworkSettings()
@@ -69,22 +69,23 @@ def test_offline_segmentation_finds_the_true_one_of_a_noiseless_motion() -> None
     performed_now = [("out", "right", 12), ("side", "up", 3), ("back", "left", 6)] * 2
     steps = steps_of_demonstration(straight(performed_now), 0.01)
     edges = np.cumsum([0, *(count for _, _, count in performed_now)]).tolist()
-    found = segment(model, steps)
+    found = [(each.state, each.start, each.stop) for each in segmentation_of(model, steps)]
     assert found == list(zip([0, 1, 2, 0, 1, 2], edges[:-1], edges[1:], strict=True))
 
 
-def test_pieces_are_counted_by_the_index_of_the_step() -> None:
+def test_segments_are_counted_by_the_index_of_the_step() -> None:
     model = taught()
     later = [step._replace(index=step.index + 7) for step in steps_performed(50)]
-    whole, shifted = segment(model, steps_performed(50)), segment(model, later)
-    assert shifted == [(state, start + 7, stop + 7) for state, start, stop in whole]
+    whole, shifted = (segmentation_of(model, steps) for steps in (steps_performed(50), later))
+    assert shifted == tuple(s._replace(start=s.start + 7, stop=s.stop + 7) for s in whole)
 
 
 def test_offline_segmentation_agrees_with_the_operators_pedal() -> None:
     steps = steps_performed(60, ROUND * 2)
     marks = [step.index for step in steps if step.mark]
-    found = segment(taught(), steps)
-    assert [ROUND[piece.state] for piece in found] == list(ROUND * 2)
+    found = segmentation_of(taught(), steps)
+    assert [label_of(lesson_task(), each) for each in found] == list(ROUND * 2)
+    assert min(each.probability for each in found) > 0.8
     np.testing.assert_allclose([piece.start for piece in found], marks, atol=2)
     assert [piece.stop for piece in found[:-1]] == [piece.start for piece in found[1:]]
     assert found[-1].stop == len(steps)
@@ -95,13 +96,8 @@ def test_a_state_that_follows_itself_makes_a_piece_each_time() -> None:
     stroke = [("stroke", "right", 6), ("stroke", "left", 6)]
     settings = NetworkSettings(GestemeHmmSettings(states=2), off_network=0.0)
     model = learn(task, [straight(stroke)], settings, recognizer="gesteme-network")
-    found = segment(model, steps_of_demonstration(straight(stroke * 3), 0.01))
-    assert found == [(0, 0, 12), (0, 12, 24), (0, 24, 36)]
-
-
-def test_nothing_to_segment_is_refused() -> None:
-    with pytest.raises(ValueError, match="no steps"):
-        segment(taught(), [])
+    found = segmentation_of(model, steps_of_demonstration(straight(stroke * 3), 0.01))
+    assert [each[:4] for each in found] == [(0, 0, 0, 12), (0, 0, 12, 24), (0, 0, 24, 36)]
 
 
 def test_the_online_filter_is_the_forward_algorithm_on_the_joined_hmm() -> None:
@@ -178,7 +174,8 @@ def pressing_model() -> Model:
 
 def test_force_tells_apart_what_moves_alike() -> None:
     model = pressing_model()
-    found = segment(model, steps_of_demonstration(pressing(9, ("press", "slide", "press")), 0.01))
+    motion = pressing(9, ("press", "slide", "press"))
+    found = segmentation_of(model, steps_of_demonstration(motion, 0.01))
     assert [piece.state for piece in found] == [0, 1, 0]
 
 

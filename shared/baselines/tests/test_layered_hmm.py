@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hmcs.errors import UserError
 from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, save_model
-from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.registry import recognizer_of, segmentation_of
+from hmcs.recognition.segmentation import label_of
 from hmcs.recognition.segments import labeled_steps
 from hmcs.task import Task
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings, GestemeScores
@@ -141,6 +143,24 @@ def test_demonstrations_of_one_state_each_are_enough() -> None:
     for step, state in zip(steps, states, strict=True):
         right += int(recognizer.step(step).belief.states.argmax()) == state
     assert right / len(steps) > 0.8
+
+
+def test_offline_the_task_hmm_segments_what_the_gesteme_level_passed_up() -> None:
+    model, labeled = taught(LayeredHmmSettings()), labeled_steps(lesson_task(), performed(71))
+    found = segmentation_of(model, labeled.steps)
+    assert [label_of(model.task, each) for each in found] == list(ROUND)
+    states = np.repeat([each.state for each in found], [each.stop - each.start for each in found])
+    assert (states == labeled.states).mean() > 0.9
+
+
+def test_without_a_task_hmm_or_the_pedal_it_was_taught_with_nothing_is_segmented() -> None:
+    alone = taught(LayeredHmmSettings(evidence="none"))
+    steps = labeled_steps(lesson_task(), performed(72)).steps
+    with pytest.raises(UserError, match="no task HMM"):
+        segmentation_of(alone, steps)
+    with pytest.raises(UserError, match="restarted by the pedal"):
+        segmentation_of(taught(GIVEN), steps)
+    segmentation_of(taught(GIVEN), steps_performed(72))
 
 
 @pytest.mark.parametrize("observed", OBSERVED)

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hmcs.errors import UserError
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
-from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.registry import recognizer_of, segmentation_of
 from hmcs.recognition.segments import labeled_steps
 from hmcs.recognition.serialization import Content, ContentError, from_arrays
 from hmcs.recognition.task_chain import TaskChain, chain_of
@@ -101,3 +102,8 @@ def test_states_of_several_gestemes_gather_what_is_theirs() -> None:
     np.testing.assert_allclose(shared[:, 0], [2 / 3, 1 / 3, 0, 0])
     np.testing.assert_allclose(shared[:, 1], [0, 1 / 3, 0, 2 / 3])
     np.testing.assert_allclose(shared.sum(axis=0), 1.0)
+
+
+def test_a_kind_without_offline_segmentation_names_those_that_have_it() -> None:
+    with pytest.raises(UserError, match=r"'online-network'.*train one of segment-filter,.*lhmm"):
+        segmentation_of(taught(), steps_performed(5))

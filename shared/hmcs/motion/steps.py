@@ -197,3 +197,31 @@ def steps_of_demonstration(
         wrenches=demonstration.wrenches,
         pedals=demonstration.switches if mark_switches else None,
     )
+
+
+class SampledStep(NamedTuple):
+    """A step, and the samples it was made in."""
+
+    step: Step
+    begin: int
+    """Index of the sample at which it begins."""
+    end: int
+    """Index of the sample at which it ends, where the next one begins."""
+
+
+def sampled_steps(demonstration: Demonstration, dead_zone_m: float) -> Iterator[SampledStep]:
+    """Yield the steps of a demonstration, with the senses it has and the samples they are made in.
+
+    Raises ValueError as `steps_of` does.
+    """
+    zone, begin = DeadZone(dead_zone_m), 0
+    for end, position in enumerate(demonstration.positions):
+        orientations, wrenches = demonstration.orientations, demonstration.wrenches
+        step = zone.push(
+            position,
+            orientation=None if orientations is None else orientations[end],
+            wrench=None if wrenches is None else wrenches[end],
+        )
+        if step is not None:
+            yield SampledStep(step, begin, end)
+            begin = end

@@ -6,7 +6,7 @@ installed distribution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
@@ -16,8 +16,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from hmcs.errors import UserError, first_problem
 from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import Guarded, PassEvidence, Recognizer
+from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.segments import Segment
 from hmcs.task import Task
 
@@ -60,6 +62,10 @@ class RecognizerSpec(NamedTuple):
     layered: Callable[[Model, bool, PassEvidence], Recognizer] | None = None
     """Makes a fresh recognizer whose evidence goes through a function on its way from the gesteme
     level to the task level; None for a kind without evidence."""
+    segment: Callable[[Model, Sequence[Step], bool], tuple[StateSegment, ...]] | None = None
+    """Returns the most probable segmentation of a whole motion, one step at least, with how
+    probable each segment's state is by all of its steps; with True it may begin in any state. None
+    for a kind without offline segmentation."""
     from_older: Callable[[Any], Any] = lambda plain: plain
     """Brings the knowledge of a model file, plain as `serialization` has it, into the form of
     today where an older version of the kind wrote it in another."""
@@ -129,6 +135,24 @@ def recognizer_of(
     make = kind_named(model.recognizer).recognizer
     guarded = partial(Guarded, make(model, anywhere), lambda: make(model, True))
     return guarded() if tell is None else guarded(tell)
+
+
+def segmentation_of(
+    model: Model, steps: Sequence[Step], *, anywhere: bool = False
+) -> tuple[StateSegment, ...]:
+    """Return the segments of a whole motion, in order and without gaps; none of no steps.
+
+    It begins with the task's first state or, with `anywhere`, in any of its states. Raises
+    UserError where the model is of a kind without offline segmentation, naming those that have it.
+    """
+    segment = kind_named(model.recognizer).segment
+    if segment is None:
+        able = ", ".join(kind.name for kind in kinds() if kind.segment is not None)
+        raise UserError(
+            f"model {model.name!r} is for the recognizer {model.recognizer!r}, which has no "
+            f"offline segmentation: train one of {able}"
+        )
+    return segment(model, steps, anywhere) if steps else ()
 
 
 def _replaced(defaults: Any, given: Mapping[str, str]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.steps import DeadZone, Step, steps_of_demonstration
+from hmcs.motion.steps import Step, sampled_steps, steps_of_demonstration
 from hmcs.task import Task
 
 Integers = NDArray[np.int64]
@@ -150,24 +150,10 @@ def labeled_steps(task: Task, demonstration: Demonstration) -> LabeledSteps:
         label: (-1, -1) if label is None else _meant(task, label, demonstration, samples.start)
         for label, samples in demonstration.stretches
     }
-    zone, begin = DeadZone(task.dead_zone_m), 0
-    steps, labels = [], []
-    for end, position in enumerate(demonstration.positions):
-        step = zone.push(
-            position,
-            orientation=_row(demonstration.orientations, end),
-            wrench=_row(demonstration.wrenches, end),
-        )
-        if step is not None:
-            steps.append(step)
-            labels.append(meant[demonstration.states[(begin + end) // 2]])
-            begin = end
+    sampled = list(sampled_steps(demonstration, task.dead_zone_m))
+    labels = [meant[demonstration.states[(begin + end) // 2]] for _, begin, end in sampled]
     columns = np.array(labels, dtype=np.int64).reshape(-1, 2)
-    return LabeledSteps(tuple(steps), columns[:, 0], columns[:, 1])
-
-
-def _row(values: Array | None, k: int) -> Array | None:
-    return None if values is None else np.asarray(values[k])
+    return LabeledSteps(tuple(step for step, _, _ in sampled), columns[:, 0], columns[:, 1])
 
 
 def _meant(task: Task, label: str, demonstration: Demonstration, sample: int) -> tuple[int, int]:

@@ -14,6 +14,7 @@ Shapes: S states, K slots (a slot is one gesteme in one state), h living hypothe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,39 @@ class FilterSettings(NamedTuple):
     """A hypothesis less probable than this is dropped."""
 
 
+class Moves(NamedTuple):
+    """What comes after a segment, and after unknown motion."""
+
+    first: Array
+    """P(state of the first step), shape (S,)."""
+    first_unknown: float
+    """P(the first step is unknown motion)."""
+    follows: Array
+    """P(state j begins next | a segment of state i is over), shape (S, S)."""
+    to_unknown: Array
+    """P(unknown motion next | a segment of state i is over), shape (S,)."""
+    from_unknown: Array
+    """P(state j begins at the next step | unknown motion), shape (S,)."""
+    unknown_stays: float
+    """P(unknown motion at the next step | unknown motion)."""
+
+
+def moves_of(chain: TaskChain, settings: FilterSettings) -> Moves:
+    """Return what comes after what, by the task's chain and what it does not foresee."""
+    count = len(chain.initial)
+    expected = 1.0 - settings.any_state - settings.unknown_after
+    ended = expected * np.maximum(1.0 - chain.transition.sum(axis=1), 0.0)
+    anywhere = settings.any_state + settings.again * ended
+    return Moves(
+        first=chain.initial * (1.0 - settings.unknown_after),
+        first_unknown=settings.unknown_after,
+        follows=expected * chain.transition + anywhere[:, None] / count,
+        to_unknown=settings.unknown_after + (1.0 - settings.again) * ended,
+        from_unknown=np.full(count, settings.recover / count),
+        unknown_stays=1.0 - settings.recover,
+    )
+
+
 class SegmentFilter:
     """Moves the belief over (state, segment start) from step to step.
 
@@ -55,6 +89,7 @@ class SegmentFilter:
     def __init__(self, chain: TaskChain, settings: FilterSettings) -> None:
         self._chain = chain
         self._settings = settings
+        self._moves = moves_of(chain, settings)
         self._gestemes = tuple(int(g) for g in np.unique(chain.slot_gesteme))
         self.reset()
 
@@ -77,9 +112,8 @@ class SegmentFilter:
         A pair that is absent is impossible; a gesteme that is absent altogether has ratio 0 and
         exit 0 and is named in `missing`.
         """
-        held = set(evidence.gestemes)
-        missing = tuple(g for g in self._gestemes if g not in held)
-        table = _EvidenceTable(evidence, missing, self._chain.slot_gesteme)
+        missing = missing_gestemes(evidence, self._gestemes)
+        table = EvidenceTable(evidence, missing, self._chain.slot_gesteme)
         stayed, new_slots, unknown = self._move(table)
 
         slots = len(self._chain.slot_state)
@@ -102,12 +136,11 @@ class SegmentFilter:
         self._mass, self._unknown, self._begun = mass / total, unknown / total, True
         return self._belief(evidence.step, log_likelihood, missing)
 
-    def _move(self, table: _EvidenceTable) -> tuple[Array, Array, float]:
+    def _move(self, table: EvidenceTable) -> tuple[Array, Array, float]:
         """Exit and new starts: (mass that stays (h,), mass of new starts (K,), unknown mass)."""
-        chain, settings = self._chain, self._settings
+        chain, moves, abandon = self._chain, self._moves, self._settings.abandon
         if not self._begun:
-            states = chain.initial * (1.0 - settings.unknown_after)
-            return self._mass, self._spread(states), settings.unknown_after
+            return self._mass, self._spread(moves.first), moves.first_unknown
         exit_probability = table.exit(self._slot, self._start)
         leaving = np.bincount(
             chain.slot_state[self._slot],
@@ -115,24 +148,13 @@ class SegmentFilter:
             minlength=len(chain.initial),
         )
         stays = self._mass * (1.0 - exit_probability)
-        abandoned = settings.abandon * float(stays.sum())
-        count = len(chain.initial)
-        followed = leaving @ chain.transition
-        ended = float(leaving.sum() - followed.sum())
-        expected = 1.0 - settings.any_state - settings.unknown_after
-        anywhere = (
-            settings.any_state * float(leaving.sum())
-            + settings.again * expected * ended
-            + settings.recover * self._unknown
-        )
-        states = expected * followed + anywhere / count
+        states = leaving @ moves.follows + self._unknown * moves.from_unknown
         unknown = (
-            self._unknown * (1.0 - settings.recover)
-            + settings.unknown_after * float(leaving.sum())
-            + (1.0 - settings.again) * expected * ended
-            + abandoned
+            self._unknown * moves.unknown_stays
+            + float(leaving @ moves.to_unknown)
+            + abandon * float(stays.sum())
         )
-        return stays * (1.0 - settings.abandon), self._spread(states), unknown
+        return stays * (1.0 - abandon), self._spread(states), unknown
 
     def _spread(self, states: Array) -> Array:
         return np.asarray(states[self._chain.slot_state] * self._chain.slot_share)
@@ -152,7 +174,13 @@ class SegmentFilter:
         )
 
 
-class _EvidenceTable:
+def missing_gestemes(evidence: StepEvidence, wanted: Sequence[int]) -> tuple[int, ...]:
+    """Return those of the gestemes `wanted` that a step has no evidence for."""
+    held = set(evidence.gestemes)
+    return tuple(g for g in wanted if g not in held)
+
+
+class EvidenceTable:
     """One step's pairs, looked up by (slot, start)."""
 
     def __init__(
@@ -172,9 +200,12 @@ class _EvidenceTable:
         self._log_ratio[list(missing), :] = 0.0
 
     def exit(self, slot: Integers, start: Integers) -> Array:
+        """Return P(leaving before the step) of each (slot, start), shape (h,)."""
         return np.asarray(self._exit[self._where(slot, start)])
 
     def log_ratio(self, slot: Integers, start: Integers) -> Array:
+        """Return the log-likelihood ratio of the step for each (slot, start), −inf where it is
+        impossible, shape (h,)."""
         return np.asarray(self._log_ratio[self._where(slot, start)])
 
     def _where(self, slot: Integers, start: Integers) -> tuple[Integers, Integers]:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from hmcs.motion.steps import Step
 from hmcs.recognition.model import Model
 from hmcs.recognition.recognizer import PassEvidence, Recognizer
 from hmcs.recognition.registry import RecognizerSpec, TrainingData
 from hmcs.recognition.segment_filter.checking import check_segment_filter
 from hmcs.recognition.segment_filter.gesteme_learning import LearningSettings
 from hmcs.recognition.segment_filter.learning import learn_segment_filter
-from hmcs.recognition.segment_filter.recognizer import SegmentFilterModel, SegmentFilterRecognizer
+from hmcs.recognition.segment_filter.offline import OfflineSegmenter
+from hmcs.recognition.segment_filter.recognizer import (
+    SegmentFilterModel,
+    SegmentFilterRecognizer,
+    bank_of,
+    segment_filter_model,
+)
+from hmcs.recognition.segmentation import StateSegment
+from hmcs.recognition.task_chain import chain_of
 
 
 def _learn(data: TrainingData) -> SegmentFilterModel:
@@ -17,6 +28,15 @@ def _learn(data: TrainingData) -> SegmentFilterModel:
 
 def _recognizer(model: Model, anywhere: bool) -> Recognizer:
     return SegmentFilterRecognizer(model, anywhere=anywhere)
+
+
+def _segment(model: Model, steps: Sequence[Step], anywhere: bool) -> tuple[StateSegment, ...]:
+    bank = bank_of(model)
+    return OfflineSegmenter(
+        chain_of(model.task, anywhere=anywhere),
+        segment_filter_model(model).filter_settings,
+        [bank.step(step) for step in steps],
+    ).segments()
 
 
 def _layered(model: Model, anywhere: bool, passed: PassEvidence) -> Recognizer:
@@ -33,4 +53,5 @@ KIND = RecognizerSpec(
     recognizer=_recognizer,
     check=check_segment_filter,
     layered=_layered,
+    segment=_segment,
 )
