@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from hmcs.recognition.learning import learn
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model, save_model
 from hmcs.recognition.recognizer import BadStepError, Recognition
-from hmcs.recognition.registry import kinds, recognizer_of
+from hmcs.recognition.registry import kinds, recognizer_of, segmentation_of
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 NAMES = [kind.name for kind in kinds()]
@@ -43,6 +44,24 @@ def assert_equal(some: list[Recognition], others: list[Recognition]) -> None:
         )
         for reported, expected in zip(one.evidence or (), other.evidence or (), strict=True):
             np.testing.assert_array_equal(reported, expected)
+
+
+@pytest.mark.parametrize("name", [kind.name for kind in kinds() if kind.segment is not None])
+def test_segments_cover_a_motion_without_gaps(name: str) -> None:
+    model = taught(name)
+    steps = [step._replace(index=step.index + 7) for step in motion()]
+    for anywhere in (False, True):
+        found = segmentation_of(model, steps, anywhere=anywhere)
+        assert found[0].start == 7
+        assert found[-1].stop == 7 + len(steps)
+        for one, other in pairwise(found):
+            assert one.stop == other.start
+        for segment in found:
+            assert segment.start < segment.stop
+            assert 0 <= segment.probability <= 1 + 1e-9
+            if segment.state is not None and segment.gesteme is not None:
+                gesteme = model.task.gestemes[segment.gesteme].name
+                assert gesteme in model.task.states[segment.state].gestemes
 
 
 @pytest.mark.parametrize("name", NAMES)

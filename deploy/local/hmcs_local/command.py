@@ -11,6 +11,7 @@ from hmcs.errors import UserError
 from hmcs.shown import plain
 from hmcs_local.added_commands import add_commands
 from hmcs_local.commands import (
+    demonstrations,
     laboratory,
     operation,
     recognizers,
@@ -54,6 +55,7 @@ _IN_ORDER_OF_HELP = (
     recordings.label,
     recordings.export,
     recordings.replay,
+    demonstrations.segment,
     recognizers.recognizers,
     laboratory.study,
     laboratory.figures,

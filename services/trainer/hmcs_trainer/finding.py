@@ -13,12 +13,13 @@ import yaml
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.discovery.unlabeled import UnlabeledSettings, discover, labeled
+from hmcs.recordings.csv_labels import write_csv_labels
 from hmcs.recordings.demonstrations import stretches_of
 from hmcs.recordings.generated_marker import is_unchanged_generated, with_generated_marker
 from hmcs.recordings.labels import How, how_labeled, labels_beside, labels_of, write_labels
 from hmcs.task import Task
 from hmcs.whole_files import written_whole
-from hmcs_trainer.references import Source
+from hmcs_trainer.references import Source, is_drawing
 
 LEAST_STEPS = 3
 """A motion that reaches less far than so many steps is a slip of the hand."""
@@ -40,15 +41,15 @@ class Found(NamedTuple):
         return [each for source in self.sources for each in source.demonstrations]
 
 
-def found_states(template: Task, sources: Sequence[Source]) -> Found:
-    """Return the states found in the motion itself; labels are not looked at.
+def found_states(template: Task, sources: Sequence[Source], name: str) -> Found:
+    """Return the task of this name whose states are found in the motion; labels do not count.
 
     Raises LearningError where nothing can be found in a demonstration, naming it.
     """
     kept = [_without_slips(source, template.dead_zone_m) for source in sources]
     given = [each for source, _ in kept for each in source.demonstrations]
     discovery = discover(given, UnlabeledSettings(least_step_m=template.dead_zone_m))
-    task, demonstrations = labeled(discovery, given, template)
+    task, demonstrations = labeled(discovery, given, template.model_copy(update={"name": name}))
     coming = iter(demonstrations)
     labeled_sources = tuple(
         source._replace(demonstrations=tuple(islice(coming, len(source.demonstrations))))
@@ -68,9 +69,9 @@ def found_states(template: Task, sources: Sequence[Source]) -> Found:
 def check_places(sources: Sequence[Source], task_file: Path) -> None:
     """Raise UserError where what is found would take the place of what somebody wrote."""
     for source in sources:
-        if source.recording is None:
+        if is_drawing(source.reference):
             continue
-        beside = labels_beside(source.recording.path)
+        beside = labels_beside(Path(source.reference))
         if beside.exists() and not is_unchanged_generated(beside):
             raise UserError(
                 f"{beside}: has labels that somebody set, and --find-states would write its own in "
@@ -84,18 +85,25 @@ def check_places(sources: Sequence[Source], task_file: Path) -> None:
 
 
 def write_found(found: Found, task_file: Path) -> Iterator[str]:
-    """Write the task, and labels beside each recording; yield what was written, and where not.
+    """Write the task, and labels beside each file; yield what was written, and where not.
 
     To be called after `check_places`.
     """
     _write_task(found.task, task_file)
     yield f"the task that was found: {task_file}"
     for source in found.sources:
-        content = source.recording
-        if content is None:
-            yield f"{source.reference}: is no recording: labels are not written beside it"
+        content, beside = source.recording, labels_beside(Path(source.reference))
+        if is_drawing(source.reference):
+            yield f"{source.reference}: is a drawing: labels are not written beside it"
             continue
-        beside = labels_beside(content.path)
+        if content is None:
+            stretches = stretches_of(source.demonstrations, 0)
+            write_csv_labels(beside, stretches, Path(source.reference), found=True)
+            yield (
+                f"{_several(len(stretches), 'label')} written to {beside}: they count instead of "
+                "what its column state says, until you remove it"
+            )
+            continue
         said: How = how_labeled(content)
         stretches = stretches_of(source.demonstrations, content.first_ns)
         covered = said == "said meanwhile" and labels_of(content)

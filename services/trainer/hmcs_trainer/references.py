@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
+from hmcs.motion.demonstrations import Demonstration, DemonstrationError
 from hmcs.motion.lasa import read_drawing
+from hmcs.recordings.csv_labels import read_labeled_csv
 from hmcs.recordings.demonstrations import demonstrations_of, performances_of
 from hmcs.recordings.file_rotation import SUFFIX as RECORDING
 from hmcs.recordings.labels import labels_of
@@ -36,6 +37,8 @@ class Source(NamedTuple):
     """One at least."""
     recording: RecordingContent | None
     """None where it is no recording."""
+    notes: tuple[str, ...] = ()
+    """What should be known of it, a sentence each."""
 
 
 def is_drawing(reference: str) -> bool:
@@ -120,7 +123,8 @@ def _read(reference: str, task: Task, labels_count: bool) -> Source:
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
     if not reference.startswith(DRAWINGS):
-        return Source(reference, (read_csv(reference),), None)
+        labeled = read_labeled_csv(Path(reference))
+        return Source(reference, (labeled.demonstration,), None, labeled.notes)
     match = _DRAWING.fullmatch(reference)
     if match is None:
         raise DemonstrationError(

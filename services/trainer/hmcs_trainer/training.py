@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hmcs.bus.keys import check_name
+from hmcs.bus.keys import check_name, is_name
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recognition.learning import learn
@@ -99,9 +99,10 @@ def train(
     worth: each demonstration, or eight of many, is recognized by a model of the others. What is
     random is drawn with `seed`. With `find_states` gestemes and states are found in the motion,
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
-    as labels beside each recording. Demonstrations that no hand made are refused unless
-    `accept_implausible`; those that are given twice count once. Raises a UserError that says what
-    is wrong with the task, a reference, a demonstration, the name, the recognizer or a setting.
+    as labels beside each file; that task is called `name`, or as the model's file. Demonstrations
+    that no hand made are refused unless `accept_implausible`; those that are given twice count
+    once. Raises a UserError that says what is wrong with the task, a reference, a demonstration,
+    the name, the recognizer or a setting.
     """
     loaded = load_task(task)
     if name is not None:
@@ -113,7 +114,7 @@ def train(
         check_places(sources, task_file)
         if not accept_implausible:
             refuse([f for d in _shown(sources) for f in implausible(loaded, d) if f.serious])
-        found = found_states(loaded, sources)
+        found = found_states(loaded, sources, _name_of_found(name, task_file, loaded))
         loaded, sources = found.task, list(found.sources)
         noted += [Finding(False, sentence) for sentence in found.findings]
     demonstrations = _shown(sources)
@@ -170,9 +171,16 @@ def _read(
     sources, doubled = distinct(read_sources(references, task, labels_count=not find_states))
     noted = [Finding(False, sentence) for sentence in doubled]
     for source in sources:
+        noted += [Finding(False, note) for note in source.notes]
         if source.recording is not None:
             noted += recording_findings(task, source.recording)
     return sources, noted
+
+
+def _name_of_found(name: str | None, task_file: Path, template: Task) -> str:
+    """The name of the task that is found: its model's, else its file's, where that can be one."""
+    stem = task_file.stem
+    return name or (stem if is_name(stem) else template.name)
 
 
 def _shown(sources: Sequence[Source]) -> list[Demonstration]:

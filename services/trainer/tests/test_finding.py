@@ -161,17 +161,55 @@ def test_labels_and_tasks_that_somebody_wrote_are_never_written_over(
     assert not list(tmp_path.glob("*.hmcs"))
 
 
-def test_nothing_is_written_beside_what_is_no_recording(tmp_path: Path) -> None:
-    files = []
-    for seed in (1, 2):
-        files.append(str(tmp_path / f"take-{seed}.csv"))
-        write_csv(files[-1], shown(seed))
-    before = [Path(file).read_bytes() for file in files]
+@pytest.fixture
+def tables(tmp_path: Path) -> list[str]:
+    files = [str(tmp_path / f"take-{seed}.csv") for seed in (1, 2)]
+    for seed, file in enumerate(files, start=1):
+        write_csv(file, shown(seed))
+    return files
+
+
+def test_labels_found_beside_csv_files_train_anew_to_the_same_model(
+    tables: list[str], tmp_path: Path
+) -> None:
+    before = [Path(file).read_bytes() for file in tables]
     heard: list[str] = []
-    train(LINES.name, files, tmp_path / "m.hmcs", find_states=True, progress=heard.append)
-    assert [Path(file).read_bytes() for file in files] == before
-    assert not list(tmp_path.glob("*.labels.csv"))
-    assert f"{files[0]}: is no recording: labels are not written beside it" in heard
+    model = train(LINES.name, tables, tmp_path / "m.hmcs", find_states=True, progress=heard.append)
+    assert [Path(file).read_bytes() for file in tables] == before
+    assert any(f"labels written to {labels_beside(Path(tables[0]))}" in line for line in heard)
+    again = train(str(tmp_path / "m.yaml"), tables, tmp_path / "again.hmcs")
+    assert again.task == model.task
+    for name, path in model.paths.items():
+        np.testing.assert_array_equal(path.points, again.paths[name].points)
+
+
+def test_labels_of_another_csv_file_of_that_name_do_not_count(
+    tables: list[str], tmp_path: Path
+) -> None:
+    train(LINES.name, tables, tmp_path / "m.hmcs", find_states=True)
+    write_csv(tables[0], shown(7))
+    heard: list[str] = []
+    train(LINES.name, tables[:1], tmp_path / "n.hmcs", progress=heard.append)
+    assert any("take-1.labels.csv are of another demonstration" in line for line in heard)
+
+
+def test_labels_that_cannot_be_of_a_csv_file_are_reported_with_their_line(
+    tables: list[str], tmp_path: Path
+) -> None:
+    labeled(tables[0], "0,1,lift\n9000,9001,carry\n")
+    assert "take-1.labels.csv:3: label 'carry'" in refused(tables[:1], tmp_path)
+    labeled(tables[0], "0,1500,lift\n")
+    assert "read like milliseconds" in refused(tables[:1], tmp_path)
+    assert "is a file of labels" in refused([str(labels_beside(Path(tables[0])))], tmp_path)
+
+
+def test_what_was_found_is_a_task_of_the_name_of_its_model(
+    tables: list[str], tmp_path: Path
+) -> None:
+    model = train(LINES.name, tables, tmp_path / "mine.hmcs", find_states=True)
+    assert (model.name, load_task(tmp_path / "mine.yaml").name) == ("mine", "mine")
+    model = train(LINES.name, tables, tmp_path / "b.hmcs", name="other", find_states=True)
+    assert (model.name, load_task(tmp_path / "b.yaml").name) == ("other", "other")
 
 
 def test_a_slip_of_the_hand_is_left_out_and_reported(maker: Maker, tmp_path: Path) -> None:

@@ -9,7 +9,10 @@ from pathlib import Path
 from hmcs.errors import UserError
 
 COMMENT = "#"
-_MARK = f"{COMMENT} found by hmcs train --find-states; whoever changes a line makes it his own: "
+_MARK = f"{COMMENT} found by hmcs; whoever changes a line makes it his own: "
+_OLDER_MARK = (
+    f"{COMMENT} found by hmcs train --find-states; whoever changes a line makes it his own: "
+)
 
 
 def with_generated_marker(text: str) -> str:
@@ -28,8 +31,11 @@ def is_unchanged_generated(file: Path) -> bool:
         return False
     except OSError as error:
         raise UserError(f"{file}: cannot be read: {error.strerror or error}") from error
-    before, mark, said = text.rpartition(_MARK)
-    return bool(mark) and said == f"{_sum(before)}\n"
+    for marked in (_MARK, _OLDER_MARK):
+        before, mark, said = text.rpartition(marked)
+        if mark and said == f"{_sum(before)}\n":
+            return True
+    return False
 
 
 def _sum(text: str) -> str:

@@ -80,18 +80,23 @@ def label_notes(content: RecordingContent) -> tuple[str, ...]:
 
 
 def write_labels(
-    content: RecordingContent, stretches: Sequence[Stretch], *, found: bool = False
+    content: RecordingContent,
+    stretches: Sequence[Stretch],
+    *,
+    found: bool = False,
+    target: Path | None = None,
 ) -> Path | None:
     """Write labels beside a recording as they are read, to the ns, whole or not at all.
 
-    Those that were `found` carry a remark that says so. Where labels of another recording lie
-    there, they are moved aside; returns where to. Raises RecordingError where the file cannot be
-    written.
+    Or to the file `target`. Those that were `found` carry a remark that says so. Where labels of
+    another recording lie beside it, they are moved aside; returns where to. Raises RecordingError
+    where the file cannot be written.
     """
-    file = labels_beside(content.path)
+    beside = labels_beside(content.path)
+    file = beside if target is None else target
     try:
         text = labels_text(stretches, content.first_ns, fingerprint_of(content.path))
-        aside = _moved_aside(content)
+        aside = _moved_aside(content) if file == beside else None
         with written_whole(file) as unfinished:
             unfinished.write_text(
                 with_generated_marker(text) if found else text, encoding="utf-8", newline="\n"
