@@ -55,6 +55,7 @@ _IN_ORDER_OF_HELP = (
     recordings.label,
     recordings.export,
     recordings.replay,
+    demonstrations.check,
     demonstrations.segment,
     recognizers.recognizers,
     laboratory.study,

@@ -40,6 +40,8 @@ GAP_PERIODS = 10.0
 REGULAR_SHARE = 0.95
 """Samples come regularly where so many intervals are no longer than twice the usual one; a file of
 corners, written by hand, has no gaps."""
+_NEARLY_ALL = (1.0, 99.0)
+"""Percentiles of the positions: a tracker that jumps says nothing of units."""
 UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "inches": 0.0254}
 
 
@@ -56,47 +58,103 @@ class Finding(NamedTuple):
     """The text without what a file said instead of a name of the task; empty where it is none."""
 
 
-def implausible(task: Task, demonstration: Demonstration) -> list[Finding]:
-    """Return what no hand does: the first of each kind with its time, and how many there are."""
-    wrong_units = list(_far(task, demonstration))
+class Limits(NamedTuple):
+    """What a task says of the size and speed of its motions."""
+
+    across_m: float
+    """Across the workspace."""
+    dead_zone_m: float
+    speed_limit_m_s: float
+    """Of the robot."""
+    said: str
+    """Of the size, in a message."""
+
+
+ANY_ARM = Limits(2.0, 0.01, 1.0, "a robot arm reaches over 2 m")
+"""Where no task is known."""
+
+
+def limits_of(task: Task | None) -> Limits:
+    """Return the limits of a task, or those of any robot arm."""
+    if task is None:
+        return ANY_ARM
+    box = np.array([task.workspace.lower_m, task.workspace.upper_m])
+    across_m = float(np.linalg.norm(box[1] - box[0]))
+    return Limits(
+        across_m,
+        task.dead_zone_m,
+        task.robot.speed_limit_m_s,
+        f"the workspace is {across_m:.2f} m across",
+    )
+
+
+def implausible(task: Task | None, demonstration: Demonstration) -> list[Finding]:
+    """Return what no hand does: the first of each kind with its time, and how many there are.
+
+    Without a task it is judged by what robot arms are like, and its workspace not at all.
+    """
+    limits = limits_of(task)
+    wrong_units = list(_far(limits, demonstration))
     # Of positions in other units everything else is a consequence.
     return wrong_units or [
-        *_jumps(task, demonstration),
+        *_jumps(limits, demonstration),
         *_sudden_turns(demonstration),
-        *_outside(task, demonstration),
-        *_wrong_times(task, demonstration),
-        *_gaps(task, demonstration),
+        *(() if task is None else _outside(task, demonstration)),
+        *_wrong_times(limits, demonstration),
+        *_gaps(limits, demonstration),
     ]
 
 
-def _far(task: Task, shown: Demonstration) -> Iterator[Finding]:
-    box = np.array([task.workspace.lower_m, task.workspace.upper_m])
-    across_m = float(np.linalg.norm(box[1] - box[0]))
-    extent_m = float(np.linalg.norm(np.ptp(shown.positions, axis=0)))
-    if extent_m <= FARTHEST * across_m:
+def likely_units(limits: Limits, shown: Demonstration) -> list[str]:
+    """Return in which units positions that reach too far would fit; none where they are meters.
+
+    None either where no unit makes them fit. A task is shown with much of its workspace, so that
+    the largest unit is meant; of any robot arm nobody can tell.
+    """
+    extent_m = extent_of(shown)
+    if extent_m <= FARTHEST * limits.across_m:
+        return []
+    fits = [unit for unit, size_m in UNITS.items() if extent_m * size_m <= limits.across_m]
+    return fits if limits is ANY_ARM else fits[-1:]
+
+
+def seems_other_times(limits: Limits, shown: Demonstration) -> bool:
+    """Return whether the times are too long for the way to be seconds."""
+    steps = steps_of(shown.positions, limits.dead_zone_m)
+    return bool(steps) and float(shown.time_s[-1] - shown.time_s[0]) / len(steps) > SLOWEST_S
+
+
+def extent_of(shown: Demonstration) -> float:
+    """Return the diagonal of the box that nearly all of a way fits in, m, and no single jump."""
+    lower, upper = np.percentile(shown.positions, _NEARLY_ALL, axis=0)
+    return float(np.linalg.norm(upper - lower))
+
+
+def _far(limits: Limits, shown: Demonstration) -> Iterator[Finding]:
+    extent_m = extent_of(shown)
+    if extent_m <= FARTHEST * limits.across_m:
         return
-    fits = [unit for unit, size_m in UNITS.items() if extent_m * size_m <= across_m]
-    guess = f"are they in {fits[-1]}? Give meters" if fits else "mend them, or leave it out"
+    units = " or ".join(likely_units(limits, shown))
+    guess = f"are they in {units}? Give meters" if units else "mend them, or leave it out"
     yield Finding(
         True,
-        f"{shown.name}: its positions reach over {extent_m:.4g} m, the workspace is "
-        f"{across_m:.2f} m across: {guess}",
+        f"{shown.name}: its positions reach over {extent_m:.4g} m, {limits.said}: {guess}",
         may_be_accepted=True,
     )
 
 
-def _jumps(task: Task, shown: Demonstration) -> Iterator[Finding]:
+def _jumps(limits: Limits, shown: Demonstration) -> Iterator[Finding]:
     period_s, moved_m, speed_m_s = _motion(shown, _longest_periods(shown.time_s))
-    length_m = length_of(steps_of(shown.positions, task.dead_zone_m))
+    length_m = length_of(steps_of(shown.positions, limits.dead_zone_m))
     usual_m_s = length_m / float(shown.time_s[-1] - shown.time_s[0])
     velocity = np.diff(shown.positions, axis=0) / period_s[:, None]
     change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
     harder = change / (0.5 * (period_s[1:] + period_s[:-1]))
     # At the ends nothing is known before, or after.
     hard = np.minimum(np.append(np.inf, harder), np.append(harder, np.inf)) > HARDEST_M_S2
-    fast = FASTEST * task.robot.speed_limit_m_s
+    fast = FASTEST * limits.speed_limit_m_s
     sudden = (speed_m_s > fast) & (speed_m_s > SUDDEN * usual_m_s)
-    far = moved_m >= JUMP_STEPS * task.dead_zone_m
+    far = moved_m >= JUMP_STEPS * limits.dead_zone_m
     jumps = np.flatnonzero(far & (hard | sudden) & _counts(shown))
     if len(jumps):
         k = int(jumps[0])
@@ -111,7 +169,7 @@ def _jumps(task: Task, shown: Demonstration) -> Iterator[Finding]:
         yield Finding(
             False,
             f"{shown.name}: the hand goes at {usual_m_s:.3g} m/s, the robot at "
-            f"{task.robot.speed_limit_m_s:g} m/s at most: see that its times are seconds and its "
+            f"{limits.speed_limit_m_s:g} m/s at most: see that its times are seconds and its "
             "positions meters",
         )
 
@@ -172,10 +230,10 @@ def _outside(task: Task, shown: Demonstration) -> Iterator[Finding]:
         )
 
 
-def _wrong_times(task: Task, shown: Demonstration) -> Iterator[Finding]:
-    steps = steps_of(shown.positions, task.dead_zone_m)
-    lasts_s = float(shown.time_s[-1] - shown.time_s[0])
-    if steps and lasts_s / len(steps) > SLOWEST_S:
+def _wrong_times(limits: Limits, shown: Demonstration) -> Iterator[Finding]:
+    if seems_other_times(limits, shown):
+        steps = steps_of(shown.positions, limits.dead_zone_m)
+        lasts_s = float(shown.time_s[-1] - shown.time_s[0])
         yield Finding(
             False,
             f"{shown.name}: it lasts {lasts_s:.4g} s for a way of {length_of(steps):.2f} m: are "
@@ -183,13 +241,13 @@ def _wrong_times(task: Task, shown: Demonstration) -> Iterator[Finding]:
         )
 
 
-def _gaps(task: Task, shown: Demonstration) -> Iterator[Finding]:
+def _gaps(limits: Limits, shown: Demonstration) -> Iterator[Finding]:
     period_s, moved_m, _ = _motion(shown, np.diff(shown.time_s))
     usual_s = float(np.median(period_s))
     if (period_s <= 2.0 * usual_s).mean() < REGULAR_SHARE:
         return
     long = period_s > max(LONGEST_GAP_S, GAP_PERIODS * usual_s)
-    gaps = np.flatnonzero(long & (moved_m >= JUMP_STEPS * task.dead_zone_m) & _counts(shown))
+    gaps = np.flatnonzero(long & (moved_m >= JUMP_STEPS * limits.dead_zone_m) & _counts(shown))
     if len(gaps):
         k = int(gaps[0])
         yield Finding(

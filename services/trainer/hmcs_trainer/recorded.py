@@ -15,7 +15,7 @@ _WITH_A_TASK = ("input_device/", "robot/")
 """Prefix of the metadata of processes that work on a task."""
 
 
-def recording_findings(task: Task, content: RecordingContent) -> Iterator[Finding]:
+def recording_findings(task: Task | None, content: RecordingContent) -> Iterator[Finding]:
     """Yield what may be wrong with a recording: its end, what was lost, whose task it was."""
     name = content.path.name
     tasks = {
@@ -23,10 +23,12 @@ def recording_findings(task: Task, content: RecordingContent) -> Iterator[Findin
         for member, facts in content.metadata.items()
         if member.startswith(_WITH_A_TASK) and facts.get("task")
     }
-    for other in sorted(tasks - {task.name}):
+    own = "" if task is None else task.name
+    others = tasks - {own} if own else set[str]()
+    for other in sorted(others):
         yield Finding(
             False,
-            f"{name}: was recorded with task {other!r}, not {task.name!r}: see that its labels and "
+            f"{name}: was recorded with task {other!r}, not {own!r}: see that its labels and "
             "its workspace are those of the task you train for",
         )
     losses = losses_of(content, Motion)

@@ -56,16 +56,16 @@ def read_references(references: Sequence[str], task: Task) -> list[Demonstration
 
 
 def read_sources(
-    references: Sequence[str], task: Task, *, labels_count: bool = True
+    references: Sequence[str], task: Task | None, *, labels_count: bool = True
 ) -> list[Source]:
-    """Return what each reference names.
+    """Return what each reference names; drawings need a task.
 
     `lasa:SHAPE/FIRST-LAST` names several drawings, a recording may hold several demonstrations:
     where labels count those that are labeled, else those its operator began anew. Raises
     DemonstrationError for a reference that names none, RecordingError for a recording that cannot
     be used.
     """
-    return _told_apart([_read(reference, task, labels_count) for reference in references])
+    return told_apart([_read(reference, task, labels_count) for reference in references])
 
 
 def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
@@ -100,7 +100,7 @@ def _digest(demonstration: Demonstration) -> bytes:
     return digest.digest()
 
 
-def _told_apart(sources: list[Source]) -> list[Source]:
+def told_apart(sources: Sequence[Source]) -> list[Source]:
     """Name demonstrations of files with equal names by the whole reference, so that a message
     about one cannot be taken for another's."""
     bare = Counter(path.name for path in {Path(source.reference) for source in sources})
@@ -119,7 +119,7 @@ def _told_apart(sources: list[Source]) -> list[Source]:
     ]
 
 
-def _read(reference: str, task: Task, labels_count: bool) -> Source:
+def _read(reference: str, task: Task | None, labels_count: bool) -> Source:
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
     if not reference.startswith(DRAWINGS):
@@ -130,6 +130,8 @@ def _read(reference: str, task: Task, labels_count: bool) -> Source:
         raise DemonstrationError(
             f"{reference}: write lasa:SHAPE/NUMBER or lasa:SHAPE/FIRST-LAST, e.g. lasa:Sine/1-5"
         )
+    if task is None:
+        raise DemonstrationError(f"{reference}: a drawing is of a task: name it by --task")
     first = int(match["first"])
     last = int(match["last"] or first)
     if last < first:

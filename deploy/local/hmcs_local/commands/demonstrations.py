@@ -1,4 +1,4 @@
-"""Judge and take apart what was demonstrated: `segment`."""
+"""Judge and take apart what was demonstrated: `check`, `segment`."""
 
 from __future__ import annotations
 
@@ -36,3 +36,18 @@ def segment(
     from hmcs_local.segmenting import segment_files
 
     segment_files(files, model, out=out, anywhere=anywhere, console=Console())
+
+
+def check(
+    files: Annotated[list[str], typer.Argument(help=FILES)],
+    task: Annotated[
+        str, typer.Option(metavar="TASK", help="A shipped task's name or a task file, if known.")
+    ] = "",
+) -> None:
+    """Judge demonstrations: units, rate, length, extent, workspace, states, and what to do.
+
+    The exit code is 2 where `hmcs train` would refuse one.
+    """
+    from hmcs_local.checking import show_check
+
+    raise typer.Exit(0 if show_check(files, task, Console()) else 2)
