@@ -30,6 +30,8 @@ OUTLIER_OF_TWO = 2.0
 """Of two performances, one so many times as long as the other is wild."""
 OTHER_UNITS = 10.0
 """So many times as long, or as short, is no way of showing the same: its units are others."""
+FLAT_STEPS = 3.0
+"""So many dead zones along z are no plane."""
 SLOWER = 1.25
 """A hand may make so many times the steps that were demonstrated."""
 
@@ -49,6 +51,7 @@ def findings(task: Task, demonstrations: Sequence[Demonstration]) -> list[Findin
         found += _wild(task, segments)
         found += _long(task, segments)
         found += _unturned(task, segments)
+        found += _flat(task, segments)
         if not any(finding.serious for finding in found):
             # Where hands jump, or units differ, disagreement is a consequence.
             check_agreement(task, segments)
@@ -215,6 +218,30 @@ def _unturned(task: Task, segments: Sequence[Segment]) -> list[Finding]:
                 for k, segment in enumerate(own)
                 if k not in alike
             ]
+    return found
+
+
+def _flat(task: Task, segments: Sequence[Segment]) -> list[Finding]:
+    """Performances in the plane z = 0 where others of their gesteme are in space."""
+    found = []
+    for index, gesteme in enumerate(task.gestemes):
+        own = [segment for segment in segments if segment.gesteme == index]
+        flat = [segment for segment in own if not segment.positions[:, 2].any()]
+        others = [segment for segment in own if segment.positions[:, 2].any()]
+        if not flat or not others:
+            continue
+        high_m = float(np.median([np.ptp(segment.positions[:, 2]) for segment in others]))
+        if high_m > FLAT_STEPS * task.dead_zone_m:
+            names = ", ".join(dict.fromkeys(segment.demonstration for segment in flat))
+            found.append(
+                Finding(
+                    True,
+                    f"{names}: {gesteme.name!r} stays in the plane z = 0, others of it move "
+                    f"{high_m:.2f} m along z: is the column z_m missing? Give all of them in two "
+                    "dimensions, or in three",
+                    may_be_accepted=True,
+                )
+            )
     return found
 
 

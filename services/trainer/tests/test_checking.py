@@ -116,6 +116,18 @@ def test_motion_without_labels_is_judged_for_itself_and_told_what_to_do(write: W
     assert any("bare.csv: has no labels" in finding.text for finding in check.told)
 
 
+def test_two_dimensions_among_three_are_told_in_one_line_before_they_disagree(
+    write: Write,
+) -> None:
+    flat = performed(1)
+    files = [write("flat.csv", flat._replace(positions=flat.positions * (1, 1, 0)))]
+    files += [write(f"d{k}.csv", performed(k)) for k in (2, 3)]
+    with pytest.raises(LearningError) as told:
+        checked(lesson_task(), files, lambda _: None)
+    assert "flat.csv: 'lift' stays in the plane z = 0" in str(told.value)
+    assert "another way" not in str(told.value)
+
+
 def test_a_plane_among_motions_in_space_is_told(write: Write) -> None:
     flat = performed(1)
     flat = flat._replace(positions=flat.positions * (1, 1, 0))

@@ -3,35 +3,36 @@
 A file has the header
 `time_s,x_m,y_m[,z_m][,qx,qy,qz,qw][,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm][,state]` and a row a sample.
 Where there is no `z_m` the motion lies in the plane z = 0; where `state` is empty the sample
-carries no label. Orientation and wrench are there with all of their columns or none.
+carries no label. Orientation and wrench are there with all of their columns or none. Columns may
+stand in any order, in small letters or capitals, with others among them, which are not read; how
+they may be separated is in `hmcs.csv_tables`.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hmcs.arrays import Array
+from hmcs.csv_tables import BadTableError, CsvTable, table_in
 from hmcs.errors import UserError
 from hmcs.motion.quaternions import is_unit
-from hmcs.plain_numbers import number_in, separator_in
-
-if TYPE_CHECKING:
-    from _csv import Reader
-
+from hmcs.plain_numbers import number_in
 
 _TIME, _AXES, _STATE = "time_s", ("x_m", "y_m", "z_m"), "state"
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _WRENCH = ("fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm")
 _HEADER = f"time_s,x_m,y_m[,z_m][,{','.join(_QUATERNION)}][,{','.join(_WRENCH)}][,state]"
-
+_KNOWN = {_TIME, *_AXES, *_QUATERNION, *_WRENCH, _STATE}
+_NEAR = 0.6
+"""How alike the name of a column is to the one it is taken to mean, as `difflib` counts."""
 
 LARGEST_BYTES = 512 * 1024 * 1024
 """Of a file: an hour at 1 kHz with every column. What is read of it takes several times as much."""
@@ -89,40 +90,54 @@ class Demonstration(NamedTuple):
         )
 
 
+class ReadCsv(NamedTuple):
+    """A demonstration as it was read."""
+
+    demonstration: Demonstration
+    ignored: tuple[str, ...]
+    """Names of columns that were not read."""
+
+
 def read_csv(path: str | Path) -> Demonstration:
     """Read a demonstration from a CSV file.
 
     Raises DemonstrationError, naming file and line, when the file cannot be read, is empty, is no
-    text, has no header or unknown columns, has a row with too few or too many fields, a number that
-    is none or is not finite, a time that does not rise, a quaternion that is no rotation, or fewer
-    than two samples.
+    text, has no header, lacks a column or has one that seems to be misspelled, has a row with too
+    few or too many fields, a number that is none or is not finite, a time that does not rise, a
+    quaternion that is no rotation, or fewer than two samples.
     """
+    return read_with_others(path).demonstration
+
+
+def read_with_others(path: str | Path) -> ReadCsv:
+    """Read a demonstration as `read_csv` does, with the names of the columns that were not read."""
     file = Path(path)
-    reader = csv.reader(io.StringIO(_text(file), newline=""), strict=True)
     try:
-        columns = _columns(file, next(reader, []))
-        rows = list(_rows(file, reader, columns))
-    except csv.Error as error:
-        raise DemonstrationError(f"{file}:{reader.line_num}: not a CSV file: {error}") from error
+        table = table_in(_text(file))
+        columns = _columns(file, table)
+        rows = list(_rows(file, table, columns))
+    except BadTableError as error:
+        raise DemonstrationError(f"{file}:{error.line}: {error}") from error
     if len(rows) < 2:
         raise DemonstrationError(
             f"{file}: {'one sample only' if rows else 'no sample'}, expected two at least below "
             "the header"
         )
-    table = dict(zip(columns, np.array([row.numbers for row in rows]).T, strict=False))
-    table.setdefault(_AXES[2], np.zeros(len(rows)))
+    numbers = dict(zip(columns.numbers, np.array([row.numbers for row in rows]).T, strict=True))
+    numbers.setdefault(_AXES[2], np.zeros(len(rows)))
 
     def together(names: tuple[str, ...]) -> Array:
-        return np.stack([table[name] for name in names], axis=1)
+        return np.stack([numbers[name] for name in names], axis=1)
 
-    return Demonstration(
+    demonstration = Demonstration(
         file.name,
-        table[_TIME],
+        numbers[_TIME],
         together(_AXES),
         tuple(row.state for row in rows),
-        together(_QUATERNION) if _QUATERNION[0] in table else None,
-        together(_WRENCH) if _WRENCH[0] in table else None,
+        together(_QUATERNION) if _QUATERNION[0] in numbers else None,
+        together(_WRENCH) if _WRENCH[0] in numbers else None,
     )
+    return ReadCsv(demonstration, columns.ignored)
 
 
 def write_csv(path: str | Path, demonstration: Demonstration) -> None:
@@ -186,69 +201,101 @@ def _text(file: Path) -> str:
     return text
 
 
-def _columns(file: Path, header: list[str]) -> list[str]:
-    columns = [column.strip() for column in header]
-    positions = [column for column in columns if column in _AXES]
-    axes = _AXES if _AXES[2] in columns else _AXES[:2]
-    senses = [sense for sense in (_QUATERNION, _WRENCH) if set(sense) & set(columns)]
-    wanted = [_TIME, *axes, *(name for sense in senses for name in sense)]
-    if columns in (wanted, [*wanted, _STATE]):
-        return columns
-    known = {_TIME, *_AXES, *_QUATERNION, *_WRENCH, _STATE}
-    strangers = [column for column in columns if column not in known]
-    lacking = [name for sense in senses for name in sense if name not in columns]
-    if columns[:1] != [_TIME] and _is_numbers(columns):
+class _Columns(NamedTuple):
+    """Where in a row what stands."""
+
+    numbers: dict[str, int]
+    """The column's index by its name."""
+    state: int | None
+    ignored: tuple[str, ...]
+    width: int
+
+
+def _columns(file: Path, table: CsvTable) -> _Columns:
+    names = [name.lower() for name in table.header]
+    twice = sorted({name for name in names if name and names.count(name) > 1 and name in _KNOWN})
+    strangers = [
+        written for written, name in zip(table.header, names, strict=True) if name not in _KNOWN
+    ]
+    lacking = _lacking(names)
+    near = {name: _meant(name, names) for name in strangers}
+    misspelled = [f"{name!r} (did you mean {meant!r}?)" for name, meant in near.items() if meant]
+    if not {_TIME, *_AXES} & set(names) and _is_numbers(table.header):
         what = "the header is missing"
-    elif (mark := separator_in(",".join(header))) is not None:
-        what = f"the columns are separated by {mark}, separate them by commas"
-    elif strangers:
-        what = f"unknown column {', '.join(repr(column) for column in strangers)}"
-    elif not set(_AXES[:2]) <= set(positions):
-        what = f"positions have {len(positions)} dimension(s), expected 2 or 3"
+    elif misspelled:
+        what = f"unknown column {', '.join(misspelled)}"
+    elif twice:
+        what = f"the column {', '.join(map(repr, twice))} is there twice"
     elif lacking:
-        what = f"there is no column {', '.join(repr(column) for column in lacking)}"
+        what = f"there is no column {', '.join(map(repr, lacking))} in {','.join(table.header)!r}"
+        if lacking == [_AXES[1]]:
+            what += ": add it, 0 in all rows where the hand does not move that way"
     else:
-        what = f"the columns are {','.join(columns)!r}"
-    raise DemonstrationError(f"{file}:1: {what}; the header must be {_HEADER}")
+        where = {name: index for index, name in enumerate(names)}
+        wanted = [_TIME, *_AXES, *_QUATERNION, *_WRENCH]
+        numbers = {name: where[name] for name in wanted if name in where}
+        return _Columns(numbers, where.get(_STATE), tuple(filter(None, strangers)), len(names))
+    raise DemonstrationError(f"{file}:{table.header_line}: {what}; the header must be {_HEADER}")
 
 
-def _rows(file: Path, reader: Reader, columns: list[str]) -> Iterator[_Row]:
-    labeled = columns[-1] == _STATE
-    names = columns[: len(columns) - labeled]
-    first = names.index(_QUATERNION[0]) if _QUATERNION[0] in names else None
+def _lacking(names: Sequence[str]) -> list[str]:
+    senses = [sense for sense in (_QUATERNION, _WRENCH) if set(sense) & set(names)]
+    wanted = [_TIME, *_AXES[:2], *(name for sense in senses for name in sense)]
+    return [name for name in wanted if name not in names]
+
+
+def _meant(stranger: str, names: Sequence[str]) -> str | None:
+    """The known column that is not there and that a stranger seems to be; None for none."""
+    missing = [
+        name for name in (_TIME, *_AXES, _STATE, *_QUATERNION, *_WRENCH) if name not in names
+    ]
+    plain = stranger.lower()
+    begins = [name for name in missing if plain and name.startswith(f"{plain}_")]
+    near = begins or get_close_matches(plain, missing, n=1, cutoff=_NEAR)
+    return near[0] if near else None
+
+
+def _rows(file: Path, table: CsvTable, columns: _Columns) -> Iterator[_Row]:
+    rotation = _QUATERNION[0] in columns.numbers
+    names = list(columns.numbers)
+    first = names.index(_QUATERNION[0]) if rotation else 0
     before_s = -math.inf
-    for fields in reader:
-        if not fields:
-            continue
-        where = f"{file}:{reader.line_num}"
-        if len(fields) != len(columns):
-            raise DemonstrationError(
-                f"{where}: {len(fields)} field(s), expected {len(columns)} ({','.join(columns)}): "
-                "the row is incomplete or has too much"
+    for line, fields in table.rows:
+        where = f"{file}:{line}"
+        if len(fields) != columns.width:
+            hint = (
+                ", or its numbers have decimal commas, which need semicolons between columns"
+                if table.separator == "," and len(fields) > columns.width
+                else ""
             )
-        numbers = [_number(where, name, text) for name, text in zip(names, fields, strict=False)]
+            raise DemonstrationError(
+                f"{where}: {len(fields)} field(s), expected {columns.width} "
+                f"({','.join(table.header)}): the row is incomplete or has too much{hint}"
+            )
+        numbers = [_number(where, name, table, fields[columns.numbers[name]]) for name in names]
         if numbers[0] <= before_s:
             raise DemonstrationError(
                 f"{where}: time_s is {numbers[0]}, expected more than the {before_s} of the row "
                 "before: times must rise"
             )
         before_s = numbers[0]
-        if first is not None and not is_unit(numbers[first : first + 4]):
+        if rotation and not is_unit(numbers[first : first + 4]):
             raise DemonstrationError(
                 f"{where}: {','.join(_QUATERNION)} is {numbers[first : first + 4]}, expected a "
                 "rotation: a quaternion of length 1"
             )
-        yield _Row(numbers, (fields[-1].strip() or None) if labeled else None)
+        state = None if columns.state is None else fields[columns.state].strip()
+        yield _Row(numbers, state or None)
 
 
-def _number(where: str, name: str, text: str) -> float:
+def _number(where: str, name: str, table: CsvTable, text: str) -> float:
     try:
-        return number_in(text)
+        return table.number(text)
     except ValueError as error:
         raise DemonstrationError(f"{where}: {name} is {error}") from None
 
 
-def _is_numbers(fields: list[str]) -> bool:
+def _is_numbers(fields: Sequence[str]) -> bool:
     try:
         return bool([number_in(text) for text in fields])
     except ValueError:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv
+from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_with_others
 from hmcs.recordings.fingerprints import Fingerprint
 from hmcs.recordings.generated_marker import with_generated_marker
 from hmcs.recordings.label_files import labels_text, read_labels
@@ -29,7 +29,7 @@ class LabeledCsv(NamedTuple):
 
     demonstration: Demonstration
     notes: tuple[str, ...]
-    """What should be known of the labels beside it, a sentence each."""
+    """What should be known of its columns and of the labels beside it, a sentence each."""
 
 
 def read_labeled_csv(file: Path) -> LabeledCsv:
@@ -42,9 +42,10 @@ def read_labeled_csv(file: Path) -> LabeledCsv:
         raise DemonstrationError(
             f"{file}: is a file of labels: name the demonstration beside it, whose labels they are"
         )
-    demonstration, beside = read_csv(file), labels_beside(file)
+    (demonstration, ignored), beside = read_with_others(file), labels_beside(file)
+    notes = [f"{file.name}: not read: column {', '.join(map(repr, ignored))}"] if ignored else []
     if not beside.is_file():
-        return LabeledCsv(demonstration, ())
+        return LabeledCsv(demonstration, tuple(notes))
     written = read_labels(beside, 0)
     if written.fingerprint not in (None, csv_fingerprint(file)):
         note = (
@@ -52,9 +53,9 @@ def read_labeled_csv(file: Path) -> LabeledCsv:
             "not count; remove that file, or, if they are of this one, its line with the "
             "fingerprint"
         )
-        return LabeledCsv(demonstration, (f"{file.name}: {note}",))
+        return LabeledCsv(demonstration, (*notes, f"{file.name}: {note}"))
     _check_times(demonstration, beside, written.stretches, written.lines)
-    return LabeledCsv(labeled_by(demonstration, written.stretches), ())
+    return LabeledCsv(labeled_by(demonstration, written.stretches), tuple(notes))
 
 
 def labeled_by(demonstration: Demonstration, stretches: Sequence[Stretch]) -> Demonstration:

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from hmcs.errors import UserError
-from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_csv, write_csv
+from hmcs.motion.demonstrations import (
+    Demonstration,
+    DemonstrationError,
+    read_csv,
+    read_with_others,
+    write_csv,
+)
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -100,6 +106,46 @@ def test_windows_files_with_a_mark_and_empty_lines_are_read(tmp_path: Path) -> N
     assert read_csv(file).states == ("a", None)
 
 
+READ_AS_ONE: dict[str, str] = {
+    "semicolons": "time_s;x_m;y_m;z_m;state\n0;0.5;-1;2e-3;a\n1;1.5;0;0;\n",
+    "decimal commas": "time_s;x_m;y_m;z_m;state\n0;0,5;-1;2e-3;a\n1;1,5;0;0;\n",
+    "tabs": "time_s\tx_m\ty_m\tz_m\tstate\n0\t0,5\t-1\t2e-3\ta\n1\t1.5\t0\t0\t\n",
+    "remarks": '# by hand\ntime_s,x_m,y_m,z_m,state\n0,0.5,-1,2e-3,a\n # "x\n1,1.5,0,0,\n# end\n',
+    "capitals": "TIME_S, X_m ,Y_M,Z_M,State\n0,0.5,-1,2e-3,a\n1,1.5,0,0,\n",
+    "another order": "state,z_m,y_m,x_m,time_s\na,2e-3,-1,0.5,0\n,0,0,1.5,1\n",
+    "others": "frame,time_s,x_m,y_m,gripper,z_m,state,state_id\n"
+    "one,0,0.5,-1,,2e-3,a,7\ntwo,1,1.5,0,x,0,,\n",
+    "empty columns": "time_s;x_m;y_m;z_m;state;;\n0;0.5;-1;2e-3;a;;\n1;1.5;0;0;;;\n",
+    "quotes": '"time_s","x_m","y_m","z_m","state"\n"0","0.5","-1","2e-3","a"\n1,1.5,0,0,\n',
+}
+
+
+@pytest.mark.parametrize("written", READ_AS_ONE.values(), ids=READ_AS_ONE)
+def test_tables_as_people_have_them_are_read_alike(tmp_path: Path, written: str) -> None:
+    file = tmp_path / "d.csv"
+    for text in (written, "\ufeff" + written.replace("\n", "\r\n")):
+        file.write_bytes(text.encode())
+        found = read_csv(file)
+        np.testing.assert_array_equal(found.time_s, [0, 1])
+        np.testing.assert_array_equal(found.positions, [[0.5, -1, 2e-3], [1.5, 0, 0]])
+        assert found.states == ("a", None)
+
+
+def test_what_numpy_writes_is_read_with_its_header_in_a_remark(tmp_path: Path) -> None:
+    file, rows = tmp_path / "d.csv", np.random.default_rng(1).normal(size=(20, 4)).cumsum(axis=0)
+    rows[:, 0] = np.arange(20)
+    for separator in (",", ";", "\t"):
+        header = separator.join(("time_s", "x_m", "y_m", "z_m"))
+        np.savetxt(file, rows, delimiter=separator, header=header)
+        np.testing.assert_array_equal(read_csv(file).positions, rows[:, 1:])
+
+
+def test_columns_that_are_not_read_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "d.csv"
+    file.write_text("time_s,Frame,x_m,y_m,z_m,w_m\n0,a,1,2,3,4\n1,b,1,2,4,4\n")
+    assert read_with_others(file).ignored == ("Frame", "w_m")
+
+
 GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
 
 
@@ -109,13 +155,14 @@ GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
         (b"", 1, "empty"),
         (b"\n  \n", 1, "empty"),
         (b"0,0,0\n1,1,1\n", 1, "header is missing"),
-        (b"time_s,x_m,y_m,zz_m\n0,0,0,0\n", 1, "unknown column 'zz_m'"),
-        (b"time_s,x_m\n0,0\n1,1\n", 1, "1 dimension"),
-        (b"time_s,x_m,y_m,z_m,w_m\n", 1, "unknown column 'w_m'"),
-        (b"x_m,y_m,time_s\n0,0,0\n", 1, "the columns are"),
-        (b"time_s,x_m,y_m,qx,qy,qw\n", 1, "there is no column 'qz'"),
+        (b"time_s,x_m,y_m,zz_m\n0,0,0,0\n", 1, "column 'zz_m' (did you mean 'z_m'?)"),
+        (b"time_s,x_m\n0,0\n1,1\n", 1, "no column 'y_m' in 'time_s,x_m': add it, 0 in all rows"),
+        (b"time_s,x_m,z_m\n0,0,0\n1,1,1\n", 1, "no column 'y_m' in 'time_s,x_m,z_m'"),
+        (b"t,x,y\n0,0,0\n1,1,1\n", 1, "'x' (did you mean 'x_m'?)"),
+        (b"Time,X_mm,Y_mm\n0,0,0\n", 1, "'X_mm' (did you mean 'x_m'?)"),
+        (b"time_s,x_m,y_m,stat\n0,0,0,a\n", 1, "'stat' (did you mean 'state'?)"),
+        (b"time_s,x_m,y_m,qx,qy,qw\n", 1, "no column 'qz'"),
         (b"time_s,x_m,y_m,fx_n,fy_n,fz_n,state\n", 1, "no column 'tx_nm', 'ty_nm', 'tz_nm'"),
-        (b"time_s,x_m,y_m,qw,qx,qy,qz\n", 1, "the columns are"),
         (b"time_s,x_m,y_m,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,2\n", 3, "length 1"),
         (b"time_s,x_m,y_m,qx,qy,qz,qw\n0,0,0,0,0,0,nan\n", 2, "qw is nan"),
         (b"time_s,x_m,y_m,y_m\n0,0,0,0\n1,0,0,0\n", 1, "header must be"),
@@ -131,8 +178,9 @@ GOOD = "time_s,x_m,y_m,z_m\n0,0,0,0\n1,1,1,1\n"
         (GOOD.encode() + "2,１,2,2\n".encode(), 4, "x_m is '１'"),
         (GOOD.encode() + b"2,2,infinity,2\n", 4, "y_m is infinity, expected a finite number"),
         (GOOD.encode() + b"1_0,2,2,2\n", 4, "time_s is '1_0'"),
-        (b"time_s;x_m;y_m\n0;0;0\n", 1, "separated by semicolons, separate them by commas"),
-        (b"time_s\tx_m\ty_m\n0\t0\t0\n", 1, "separated by tabs"),
+        (b"time_s;x_m;y_m\n0;0;0\n1;1.000,5;0\n", 3, "x_m is '1.000,5'"),
+        (b"time_s,x_m,y_m\n0,0,0\n0,5,1,0,2,0\n", 3, "decimal commas, which need semicolons"),
+        (b"# a\n# b\ntime_s,x_m\n0,0\n", 3, "no column 'y_m'"),
         (GOOD.encode() + b"1,2,2,2\n", 4, "times must rise"),
         (GOOD.encode() + b"0.5,2,2,2\n", 4, "times must rise"),
         (b"time_s,x_m,y_m\n0,0,0\n", None, "one sample only"),
