@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import os
 import sys
+from contextlib import suppress
+from importlib.metadata import version
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -22,14 +27,20 @@ from hmcs_local.commands import (
 )
 from hmcs_secure.command import app as secure_app
 
-USER_MISTAKE = 2
+USER_MISTAKE, OUTPUT_FAILED = 2, 1
+_OUTPUT_FAILS = (errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EFBIG)
 _LONGEST_LINE = 4000
 """Characters of an error message that are shown, a line."""
 
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"hmcs {version('hmcs')}")
+        raise typer.Exit
+
+
 app = typer.Typer(
-    help="HMCS: recognizes what an operator's hand is about to do, and lends it a ruler.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 task_app = typer.Typer(help="Work with task files.", no_args_is_help=True)
@@ -66,18 +77,49 @@ for _command in _IN_ORDER_OF_HELP:
 add_commands(app)
 
 
+@app.callback()
+def common(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """HMCS: recognizes what an operator's hand is about to do, and lends it a ruler."""
+
+
 def main() -> None:
-    """Run the command; a mistake of the user is one message and exit code 2, never a traceback."""
+    """Run the command; a mistake of the user is one message and exit code 2, never a traceback.
+
+    Where its output cannot be written the exit code is 1.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal may know ASCII only
             stream.reconfigure(errors="backslashreplace")
     try:
-        app()
+        try:
+            app(prog_name="hmcs")
+        finally:
+            sys.stdout.flush()
     except UserError as error:
-        # It may quote what a process or a file says.
-        lines = (plain(line, _LONGEST_LINE) for line in str(error).split("\n"))
+        _fail(str(error), USER_MISTAKE)
+    except OSError as error:
+        if error.filename is not None:
+            _fail(f"{error.filename}: {error.strerror or error}", USER_MISTAKE)
+        elif error.errno in _OUTPUT_FAILS:
+            # What is left unwritten is not tried again at exit.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _fail(f"cannot write its output: {error.strerror}", OUTPUT_FAILED)
+        else:
+            raise
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    # It may quote what a process or a file says.
+    lines = (plain(line, _LONGEST_LINE) for line in message.split("\n"))
+    with suppress(OSError):
         sys.stderr.write("hmcs: " + "\n".join(lines) + "\n")
-        sys.exit(USER_MISTAKE)
+        sys.stderr.flush()
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from hmcs.recordings.demonstrations import stretches_of
 from hmcs.recordings.generated_marker import is_unchanged_generated
 from hmcs.recordings.labels import labels_beside, write_labels
 from hmcs.shown import plain
+from hmcs.write_places import check_file_place
 from hmcs_local.tables import show_table
 from hmcs_trainer.references import Source, is_drawing, read_sources
 
@@ -118,20 +119,12 @@ def _targets(references: Sequence[str], out: Path) -> list[Path]:
                 f"{target}: is there already, and nobody says that it was found by hmcs: move it "
                 "away, or name another --out"
             )
-        _make_folder(target.parent)
+        check_file_place(target, "--out")
     return targets
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"{folder}: cannot be a folder of labels: {error.strerror}: name another --out"
-        ) from error
-
-
 def _write(source: Source, labeled: Sequence[Demonstration], target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
     content = source.recording
     if content is None:
         write_csv_labels(target, stretches_of(labeled, 0), Path(source.reference), found=True)

@@ -138,7 +138,7 @@ def test_where_labels_cannot_be_written_is_told_before_anything_is_read(
     gone = tmp_path / "gone.csv"
     code, _, err = hmcs("segment", gone, "--model", model, "--out", tmp_path / "file" / "x.csv")
     assert code == 2
-    assert f"{tmp_path / 'file'}: cannot be a folder of labels" in err
+    assert f"--out: {tmp_path / 'file'}: is no folder" in err
     code, _, err = hmcs("segment", "lasa:Sine/1", "--model", model, "--out", tmp_path)
     assert code == 2
     assert "is a drawing" in err

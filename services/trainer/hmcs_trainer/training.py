@@ -17,6 +17,7 @@ from hmcs.recognition.registry import DEFAULT, kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.selection import choose
 from hmcs.task import Task, load_task
+from hmcs.write_places import check_file_place
 from hmcs_trainer.advice import advice
 from hmcs_trainer.finding import check_places, found_states, write_found
 from hmcs_trainer.judging import judged
@@ -104,9 +105,13 @@ def train(
     once. Raises a UserError that says what is wrong with the task, a reference, a demonstration,
     the name, the recognizer or a setting.
     """
-    loaded = load_task(task)
     if name is not None:
         check_name("model", name)
+    _check_choices(recognizer, settings or {}, choices or {})
+    check_file_place(Path(output), "--output")
+    if report is not None:
+        check_file_place(Path(report), "the report")
+    loaded = load_task(task)
     progress("reading demonstrations")
     sources, noted = _read(loaded, references, find_states=find_states)
     found, task_file = None, Path(output).with_suffix(".yaml")
@@ -175,6 +180,17 @@ def _read(
         if source.recording is not None:
             noted += recording_findings(task, source.recording)
     return sources, noted
+
+
+def _check_choices(
+    recognizer: str, settings: Mapping[str, str], choices: Mapping[str, Sequence[str]]
+) -> None:
+    """Raise UserError for an unknown recognizer, a setting that it has not, or no value of it."""
+    kind = kind_named(recognizer)
+    settings_of(kind, settings)
+    for name, values in choices.items():
+        for value in values:
+            settings_of(kind, {**settings, name: value})
 
 
 def _name_of_found(name: str | None, task_file: Path, template: Task) -> str:

@@ -22,6 +22,7 @@ from hmcs.recognition.recognizer import Guarded, PassEvidence, Recognizer
 from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.segments import Segment
 from hmcs.task import Task
+from hmcs.task.model import unknown_name_message
 
 DEFAULT = "segment-filter"
 GROUP = "hmcs.recognizers"
@@ -87,10 +88,8 @@ def kind_named(name: str) -> RecognizerSpec:
     entry = _registered().get(name)
     if entry is None:
         baselines = "" if len(_registered()) > 1 else "; install hmcs-baselines for others"
-        raise UserError(
-            f"unknown recognizer {name!r}: choose one of {', '.join(sorted(_registered()))} "
-            f"(`hmcs recognizers` says what each is){baselines}"
-        )
+        unknown = unknown_name_message("recognizer", name, _registered())
+        raise UserError(f"{unknown}; `hmcs recognizers` says what each is{baselines}")
     kind: RecognizerSpec = entry.load()
     return kind
 
@@ -105,10 +104,9 @@ def settings_of(kind: RecognizerSpec, given: Mapping[str, str]) -> Any:
         chosen = _replaced(defaults, given)
         return TypeAdapter(type(defaults)).validate_python(chosen)
     except KeyError as error:
-        names = ", ".join(name for name, _ in setting_values(defaults))
-        raise UserError(
-            f"recognizer {kind.name!r} has no setting {error.args[0]!r}: it has {names}"
-        ) from None
+        names = [name for name, _ in setting_values(defaults)]
+        unknown = unknown_name_message("setting", str(error.args[0]), names)
+        raise UserError(f"recognizer {kind.name!r}: {unknown}") from None
     except ValidationError as error:
         where, why = first_problem(error)
         raise UserError(f"recognizer {kind.name!r}, setting {where}: {why}") from None

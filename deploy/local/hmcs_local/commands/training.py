@@ -81,7 +81,7 @@ def train(
             choices=alternatives,
             seed=seed,
             find_states=find_states,
-            report=output.with_suffix(".html") if report else None,
+            report=output.with_suffix(".html") if report and output.name else None,
             accept_implausible=accept_implausible,
             progress=typer.echo,
             fits=fits,
