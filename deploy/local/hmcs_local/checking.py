@@ -30,10 +30,10 @@ def show_check(references: Sequence[str], task: str, console: Console) -> bool:
             lower = np.min([each.lower_m for each in check.judged], axis=0)
             upper = np.max([each.upper_m for each in check.judged], axis=0)
             _say(console, f"they lie between {_numbers(lower)} and {_numbers(upper)} m (x y z)")
-    for finding in check.told:
+    for finding in check.findings:
         word = "refused" if finding.serious else "mind"
         _say(console, f"{word}: {plain(finding.text, _LONGEST)}")
-    return not any(finding.serious for finding in check.told)
+    return not any(finding.serious for finding in check.findings)
 
 
 def _say(console: Console, line: str) -> None:

@@ -55,7 +55,7 @@ class Check(NamedTuple):
     """What there is to say of all files."""
 
     judged: tuple[Judged, ...]
-    told: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
     """What may be wrong, and what to do, the serious first."""
 
 
@@ -65,30 +65,30 @@ def check_files(references: Sequence[str], task: Task | None) -> Check:
     Where a task is given, labels are judged by it, and what is labeled as what is trained from
     together.
     """
-    sources, told = list[Source](), list[Finding]()
+    sources, found = list[Source](), list[Finding]()
     for reference in references:
         try:
             sources += read_sources([reference], task)
         except UserError as error:
-            told.append(Finding(True, str(error)))
+            found.append(Finding(True, str(error)))
     sources = told_apart(sources)
     kept, doubled = distinct(sources)
-    told += [Finding(False, note) for note in doubled]
+    found += [Finding(False, note) for note in doubled]
     for source in sources:
-        told += [Finding(False, note) for note in source.notes]
+        found += [Finding(False, note) for note in source.notes]
         if source.recording is not None:
-            told += recording_findings(task, source.recording)
+            found += recording_findings(task, source.recording)
     shown = [each for source in kept for each in source.demonstrations]
     labeled = [each for each in shown if any(state is not None for state in each.states)]
     if task is None or not labeled:
-        told += [finding for each in shown for finding in implausible(task, each)]
+        found += [finding for each in shown for finding in implausible(task, each)]
     else:
         bare = [each for each in shown if all(state is None for state in each.states)]
-        told += [finding for each in bare for finding in implausible(task, each)]
-        told += findings(task, labeled)
-    told += _unlabeled(shown)
-    told += _planes(shown)
-    unique = tuple(dict.fromkeys(told))
+        found += [finding for each in bare for finding in implausible(task, each)]
+        found += findings(task, labeled)
+    found += _unlabeled(shown)
+    found += _planes(shown)
+    unique = tuple(dict.fromkeys(found))
     return Check(
         tuple(_judged(task, each) for source in sources for each in source.demonstrations),
         tuple(sorted(unique, key=lambda finding: not finding.serious)),

@@ -32,7 +32,7 @@ def only(check: Check) -> Judged:
 
 
 def serious(check: Check) -> list[str]:
-    return [finding.text for finding in check.told if finding.serious]
+    return [finding.text for finding in check.findings if finding.serious]
 
 
 def test_a_sound_demonstration_is_measured(write: Write) -> None:
@@ -73,7 +73,7 @@ def test_milliseconds_are_told_and_trained_from(write: Write) -> None:
     check = check_files([write("d.csv", shown._replace(time_s=1000 * shown.time_s))], None)
     assert (only(check).verdict, only(check).units) == ("mind", "m, s or not?")
     assert not serious(check)
-    assert any("in milliseconds" in finding.text for finding in check.told)
+    assert any("in milliseconds" in finding.text for finding in check.findings)
 
 
 def test_a_way_out_of_the_workspace_is_told(write: Write) -> None:
@@ -113,7 +113,7 @@ def test_motion_without_labels_is_judged_for_itself_and_told_what_to_do(write: W
     check = check_files([bare, write("d.csv", performed(2))], lesson_task())
     assert not serious(check)
     assert {judged.name: judged.states for judged in check.judged}["bare.csv"] == ()
-    assert any("bare.csv: has no labels" in finding.text for finding in check.told)
+    assert any("bare.csv: has no labels" in finding.text for finding in check.findings)
 
 
 def test_two_dimensions_among_three_are_told_in_one_line_before_they_disagree(
@@ -132,4 +132,6 @@ def test_a_plane_among_motions_in_space_is_told(write: Write) -> None:
     flat = performed(1)
     flat = flat._replace(positions=flat.positions * (1, 1, 0))
     check = check_files([write("flat.csv", flat), write("d.csv", performed(2))], None)
-    assert any(finding.text.startswith("flat.csv: in the plane z = 0") for finding in check.told)
+    assert any(
+        finding.text.startswith("flat.csv: in the plane z = 0") for finding in check.findings
+    )

@@ -18,7 +18,7 @@ from hmcs.recordings.fingerprints import Fingerprint
 from hmcs.recordings.generated_marker import with_generated_marker
 from hmcs.recordings.label_files import labels_text, read_labels
 from hmcs.recordings.labels import SUFFIX, labels_beside
-from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, to_ns, told
+from hmcs.recordings.stretches import Stretch, ends_after, misread_unit, stretch_text, to_ns
 from hmcs.whole_files import written_whole
 
 _BYTES = 1 << 20
@@ -113,6 +113,6 @@ def _check_times(
     for stretch, line in zip(stretches, lines, strict=True):
         if stretch.begin_ns >= last_ns or ends_after(stretch, last_ns + to_ns(1.0)):
             raise DemonstrationError(
-                f"{file}:{line}: label {told(stretch)} is outside of the demonstration, which is "
-                f"{lasts}: label what is in it"
+                f"{file}:{line}: label {stretch_text(stretch)} is outside of the demonstration, "
+                f"which is {lasts}: label what is in it"
             )

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-FILES = "CSV files, MCAP recordings, lasa:SHAPE/NUMBER."
+FILES = "CSV files, MCAP recordings, folders of them, patterns, lasa:SHAPE/NUMBER."
 
 
 def segment(
@@ -33,9 +33,10 @@ def segment(
     What came after a moment counts as well as what came before. The probability is that of the
     state, all of the motion given, in the mean over the segment.
     """
+    from hmcs_local.demonstration_files import expanded
     from hmcs_local.segmenting import segment_files
 
-    segment_files(files, model, out=out, anywhere=anywhere, console=Console())
+    segment_files(expanded(files), model, out=out, anywhere=anywhere, console=Console())
 
 
 def check(
@@ -49,5 +50,6 @@ def check(
     The exit code is 2 where `hmcs train` would refuse one.
     """
     from hmcs_local.checking import show_check
+    from hmcs_local.demonstration_files import expanded
 
-    raise typer.Exit(0 if show_check(files, task, Console()) else 2)
+    raise typer.Exit(0 if show_check(expanded(files), task, Console()) else 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from hmcs.bus.arrays import EvidenceFloats, Floats, Indices
 from hmcs.bus.messages.fields import Count, Name, Real
@@ -98,6 +98,9 @@ class ModelFile(Message):
     """A model file, whole."""
 
     SCHEMA = "model_file"
+
+    # In recordings bytes stand as base64.
+    model_config = ConfigDict(val_json_bytes="base64")
 
     model: Name
     """Its name."""
