@@ -32,7 +32,7 @@ def arm_description(urdf: Path, joints: tuple[str, ...]) -> ArmDescription:
     """
     files: dict[str, bytes] = {}
     for name in _named(urdf):
-        mesh = _found(urdf, name)
+        mesh = file_named(urdf, name)
         if mesh is None:
             continue
         files[name] = mesh.read_bytes()
@@ -44,7 +44,7 @@ def arm_description(urdf: Path, joints: tuple[str, ...]) -> ArmDescription:
 
 def missing_meshes(urdf: Path) -> tuple[str, ...]:
     """Return the names in a description that lead to no file: nobody can draw what they mean."""
-    return tuple(name for name in _named(urdf) if _found(urdf, name) is None)
+    return tuple(name for name in _named(urdf) if file_named(urdf, name) is None)
 
 
 def _named(urdf: Path) -> tuple[str, ...]:
@@ -57,8 +57,8 @@ def _named(urdf: Path) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in named if name))
 
 
-def _found(urdf: Path, name: str) -> Path | None:
-    """The file that a name in a description means, if there is one."""
+def file_named(urdf: Path, name: str) -> Path | None:
+    """Return the file that a name in a description means, if there is one."""
     return next((place for place in _places(urdf, name) if place.is_file()), None)
 
 

@@ -46,7 +46,7 @@ def main(argv: list[str]) -> int:
         settings = RobotSettings.model_validate_json(_first(channel))
         try:
             task = load_task(settings.task)
-            driver: ArmDriver = simulated(task, settings)
+            driver = simulated(task, settings)
             rules = rules_of(task, driver, settings)
         except UserError as error:
             channel.send(json.dumps({"mistake": str(error)}).encode())
@@ -59,6 +59,7 @@ def main(argv: list[str]) -> int:
             "priority": priority,
             "joint_names": driver.joint_names,
             "links_within": driver.links_within,
+            "engine": driver.engine_name,
         }
         channel.send(json.dumps({"ready": ready}).encode())
         try:

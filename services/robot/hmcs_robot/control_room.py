@@ -54,6 +54,7 @@ class ControlRoom:
         self.priority: str = first["ready"]["priority"]
         self.joint_names: tuple[str, ...] = tuple(first["ready"]["joint_names"])
         self.links_within: tuple[str, ...] = tuple(first["ready"]["links_within"])
+        self.engine: str = first["ready"]["engine"]
 
     @property
     def running(self) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from hmcs.arrays import Array
 from hmcs.task import Task
 from hmcs_robot.control import JointCommand, Standing, follow
+from hmcs_robot.engine import AUTO
 from hmcs_robot.set_up import limits_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings
 
@@ -18,10 +19,13 @@ PHYSICS_RATE_HZ = 200.0
 
 
 class LockstepRobot:
-    """The robot of a task. Raises UserError where it cannot stand at the start."""
+    """The robot of a task. Raises UserError where it cannot stand at the start.
 
-    def __init__(self, task: Task) -> None:
-        settings = RobotSettings(physics_rate_hz=PHYSICS_RATE_HZ)
+    `engine` is that of the service's settings.
+    """
+
+    def __init__(self, task: Task, engine: str = AUTO) -> None:
+        settings = RobotSettings(physics_rate_hz=PHYSICS_RATE_HZ, engine=engine)
         self._period_s = 1.0 / PHYSICS_RATE_HZ
         self._driver = simulated(task, settings)
         self._limits = limits_of(task, self._driver, settings)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-import pybullet_data
-
 
 class RobotModel(NamedTuple):
     """One arm as its URDF describes it, and what the URDF does not say."""
@@ -21,11 +19,11 @@ class RobotModel(NamedTuple):
     """Largest joint speeds where those of the URDF are not the maker's."""
 
 
-_PUBLIC = Path(pybullet_data.getDataPath())
+_ASSETS = Path(__file__).parent / "assets"
 
 ROBOTS: dict[str, RobotModel] = {
     "puma560": RobotModel(
-        urdf=Path(__file__).parent / "assets" / "puma560.urdf",
+        urdf=_ASSETS / "puma560.urdf",
         tool_link="tool",
         tool_offset_m=0.0,
         home=(0.36, 0.64, -3.6, 0.37, 1.4, 0.0),
@@ -33,14 +31,14 @@ ROBOTS: dict[str, RobotModel] = {
     ),
     # KUKA LBR iiwa 14 R820, data sheet: 85, 85, 100, 75, 130, 135, 135 °/s.
     "iiwa": RobotModel(
-        urdf=_PUBLIC / "kuka_iiwa" / "model.urdf",
+        urdf=_ASSETS / "iiwa" / "iiwa.urdf",
         tool_link="lbr_iiwa_link_7",
         tool_offset_m=0.045,
         home=(0.77, 0.74, -1.05, -1.88, -0.15, -0.83, 0.73),
         joint_speed_rad_s=(1.48, 1.48, 1.74, 1.30, 2.26, 2.35, 2.35),
     ),
     "panda": RobotModel(
-        urdf=_PUBLIC / "franka_panda" / "panda.urdf",
+        urdf=_ASSETS / "panda" / "panda.urdf",
         tool_link="panda_grasptarget",
         tool_offset_m=0.0,
         home=(1.43, -1.08, -0.99, -2.25, -1.39, 2.07, -1.53),

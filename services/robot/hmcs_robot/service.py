@@ -114,6 +114,7 @@ class Robot(Service):
         return {
             "robot": self._task.robot.model,
             "task": self._task.name,
+            "engine": self._room.engine,
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
             "speed_limit_m_s": f"{self._task.robot.speed_limit_m_s:g}",
             "links_not_kept_out": ", ".join(self._room.links_within),

@@ -34,6 +34,7 @@ def simulated(task: Task, settings: RobotSettings) -> Simulation:
     return Simulation(
         Scene(task.robot.model, start, task.workspace.obstacles, task.workspace.forbidden),
         1.0 / settings.physics_rate_hz,
+        engine=settings.engine,
         gui=settings.gui,
         reach_m=settings.search_m,
     )

@@ -12,6 +12,9 @@ class RobotSettings(ServiceSettings):
 
     task: str = "human-shapes"
     """Name of a task that comes along, or path of a task file: robot, workspace, obstacles."""
+    engine: str = "auto"
+    """What simulates the arm: `pybullet`, `mujoco`, or `auto`, the first of them that is installed.
+    """
     gui: bool = False
     """Show the simulation in a window."""
     physics_rate_hz: float = Field(default=240.0, ge=120.0, le=2000.0)

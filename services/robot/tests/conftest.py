@@ -3,13 +3,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-import pybullet
 import pytest
 
+from hmcs.errors import UserError
 from hmcs.task import Obstacle
-from hmcs_robot.arm import Arm
 from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow
 from hmcs_robot.driver import Pose
+from hmcs_robot.engine import PREFERRED, Cell, Engine, engine_named
 from hmcs_robot.limits import Limits
 from hmcs_robot.robots import ROBOTS
 from hmcs_robot.simulation import Scene, Simulation
@@ -59,8 +59,18 @@ def period_s() -> float:
     return PERIOD_S
 
 
+@pytest.fixture(params=PREFERRED)
+def engine(request: pytest.FixtureRequest) -> str:
+    """The name of an engine, each in turn where it is installed."""
+    try:
+        name, _ = engine_named(request.param)
+    except UserError as error:
+        pytest.skip(str(error))
+    return name
+
+
 @pytest.fixture
-def bench() -> Iterator[Callable[..., Bench]]:
+def bench(engine: str) -> Iterator[Callable[..., Bench]]:
     """Make a bench: robot, half size of the workspace (m) around the start, obstacles."""
     made = []
 
@@ -68,7 +78,7 @@ def bench() -> Iterator[Callable[..., Bench]]:
         robot: str = "puma560", half_m: float = 0.3, obstacles: tuple[Obstacle, ...] = ()
     ) -> Bench:
         start = STARTS[robot]
-        simulation = Simulation(Scene(robot, start, obstacles), PERIOD_S)
+        simulation = Simulation(Scene(robot, start, obstacles), PERIOD_S, engine=engine)
         made.append(simulation)
         limits = Limits(
             simulation.limits, 0.25, 0.5, start.position - half_m, start.position + half_m
@@ -80,20 +90,15 @@ def bench() -> Iterator[Callable[..., Bench]]:
         simulation.close()
 
 
-@pytest.fixture
-def client() -> Iterator[int]:
-    """A PyBullet client with gravity."""
-    number = pybullet.connect(pybullet.DIRECT)
-    pybullet.setGravity(0, 0, -9.81, physicsClientId=number)
-    yield number
-    pybullet.disconnect(physicsClientId=number)
-
-
 @pytest.fixture(params=sorted(ROBOTS))
 def robot(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
 @pytest.fixture
-def arm(robot: str, client: int) -> Arm:
-    return Arm(ROBOTS[robot], client)
+def arm(robot: str, engine: str) -> Iterator[Engine]:
+    """An arm alone in its cell."""
+    _, opens = engine_named(engine)
+    made = opens(Cell(ROBOTS[robot], (), ()), PERIOD_S, gui=False)
+    yield made
+    made.close()

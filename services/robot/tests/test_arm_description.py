@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 from hmcs.errors import UserError
-from hmcs_robot.arm import Arm
 from hmcs_robot.arm_description import arm_description, missing_meshes
+from hmcs_robot.engine import Engine
 from hmcs_robot.robots import ROBOTS
 
 
-def test_every_mesh_of_an_arm_is_reported_and_every_joint_named(robot: str, arm: Arm) -> None:
+def test_every_mesh_of_an_arm_is_reported_and_every_joint_named(robot: str, arm: Engine) -> None:
     robot_description = arm_description(ROBOTS[robot].urdf, arm.joint_names)
     named = set(re.findall(r'filename="([^"]+)"', robot_description.urdf))
     assert named <= set(robot_description.files)
-    assert len(robot_description.joints) == len(arm.joints) == len(np.array(ROBOTS[robot].home))
+    assert (
+        len(robot_description.joints) == len(arm.joint_names) == len(np.array(ROBOTS[robot].home))
+    )
     for joint in robot_description.joints:
         assert f'name="{joint}"' in robot_description.urdf
 

@@ -186,7 +186,7 @@ def test_the_reference_never_runs_far_ahead_of_an_arm_that_is_stuck(bench: Any) 
     arm = rig.simulation.read()
     for _ in range(240):
         rig.follow([0, 0.25, 0, 0, 0, 0])
-        rig.simulation.arm.place(arm.joint_positions)
+        rig.simulation.engine.place(arm.joint_positions)
     assert isinstance(rig.carried, Following)
     ahead = np.linalg.norm(rig.carried.pose.position - arm.tool.position)
     assert ahead <= rig.tuning.largest_lag_m + 0.25 / 240 + 1e-9
@@ -246,8 +246,8 @@ def test_the_way_into_a_singularity_is_the_one_finite_differences_find(bench: An
         for sign in (1, -1):
             moved = arm.joint_positions.copy()
             moved[joint] += sign * 1e-5
-            rig.simulation.arm.place(moved)
-            jacobian = rig.simulation.arm.jacobian(moved)
+            rig.simulation.engine.place(moved)
+            jacobian = rig.simulation.engine.jacobian(moved)
             pair.append(np.linalg.svd(jacobian, compute_uv=False)[-1])
         found.append((pair[0] - pair[1]) / 2e-5)
     np.testing.assert_allclose(inverse._growth(), found, atol=1e-4)

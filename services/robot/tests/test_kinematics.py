@@ -5,20 +5,20 @@ import pytest
 
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
-from hmcs_robot.arm import Arm
 from hmcs_robot.driver import Pose
+from hmcs_robot.engine import Engine
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
 from hmcs_robot.robots import ROBOTS
 
 
-def drawn(arm: Arm, count: int) -> np.ndarray:
+def drawn(arm: Engine, count: int) -> np.ndarray:
     room = 0.1 * (arm.limits.upper - arm.limits.lower)
     return np.random.default_rng(3).uniform(
         arm.limits.lower + room, arm.limits.upper - room, (count, len(room))
     )
 
 
-def test_jacobian_is_the_derivative_of_forward_kinematics(arm: Arm) -> None:
+def test_jacobian_is_the_derivative_of_forward_kinematics(arm: Engine) -> None:
     h = 1e-6
     for q in drawn(arm, 20):
         jacobian = arm.jacobian(q)
@@ -34,13 +34,14 @@ def test_jacobian_is_the_derivative_of_forward_kinematics(arm: Arm) -> None:
             assert np.abs(jacobian[3:, joint] - angular).max() < 1e-7
 
 
-def test_a_point_of_any_link_moves_as_commanded(arm: Arm) -> None:
+def test_a_point_of_any_link_moves_as_commanded(arm: Engine) -> None:
     h, normal = 1e-6, np.array([0.6, 0.0, 0.8])
     for q in drawn(arm, 5):
         arm.place(q)
         tool = arm.tool()
         # The tool is a point of the last moving link as well as of its own.
-        found = arm.separation_per_joint(len(q) - 1, tool.position, normal, q)
+        last = max(arm.moving_links)
+        found = arm.separation_per_joint(last, tool.position, normal, q)
         for joint in range(len(q)):
             step = h * np.eye(len(q))[joint]
             arm.place(q + step)
@@ -51,7 +52,7 @@ def test_a_point_of_any_link_moves_as_commanded(arm: Arm) -> None:
             )
 
 
-def test_inverse_kinematics_is_undone_by_forward_kinematics(robot: str, arm: Arm) -> None:
+def test_inverse_kinematics_is_undone_by_forward_kinematics(robot: str, arm: Engine) -> None:
     home = np.array(ROBOTS[robot].home)
     for q in drawn(arm, 6):
         arm.place(q)
@@ -66,13 +67,15 @@ def test_inverse_kinematics_is_undone_by_forward_kinematics(robot: str, arm: Arm
 
 
 def test_the_first_pose_of_each_robot_is_far_from_singular(
-    robot: str, arm: Arm, starts: dict[str, Pose]
+    robot: str, arm: Engine, starts: dict[str, Pose]
 ) -> None:
     found = inverse_kinematics(arm, robot, starts[robot], np.array(ROBOTS[robot].home))
     assert np.linalg.svd(arm.jacobian(found), compute_uv=False)[-1] > 0.1
 
 
-def test_an_unreachable_pose_names_pose_robot_and_the_distance_short(robot: str, arm: Arm) -> None:
+def test_an_unreachable_pose_names_pose_robot_and_the_distance_short(
+    robot: str, arm: Engine
+) -> None:
     target = Pose(np.array([2.5, 0.0, 0.5]), np.array([0.0, 0.0, 0.0, 1.0]))
     with pytest.raises(UnreachablePoseError) as error:
         inverse_kinematics(arm, robot, target, np.array(ROBOTS[robot].home))

@@ -15,8 +15,8 @@ UP = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture
-def robot():
-    made = LockstepRobot(TASK)
+def robot(engine: str):
+    made = LockstepRobot(TASK, engine)
     yield made
     made.close()
 
@@ -35,10 +35,10 @@ def test_it_goes_as_far_as_commanded(robot: LockstepRobot, period_s: float) -> N
     np.testing.assert_allclose(robot.position - begun, [0, 0, 0.1], atol=1e-3)
 
 
-def test_twice_the_same_is_the_same() -> None:
+def test_twice_the_same_is_the_same(engine: str) -> None:
     ends = []
     for _ in range(2):
-        robot = LockstepRobot(TASK)
+        robot = LockstepRobot(TASK, engine)
         for _ in range(50):
             robot.move(UP, 0.01)
         ends.append(robot.position)

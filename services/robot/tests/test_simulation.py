@@ -93,16 +93,16 @@ def test_parting_speed_has_the_sign_of_the_distance(bench: Any) -> None:
     assert all(touch.separation_per_joint @ inward < -0.5 for touch in arm.touches)
 
 
-def test_an_obstacle_at_the_start_pose_is_refused(starts: dict[str, Pose]) -> None:
+def test_an_obstacle_at_the_start_pose_is_refused(starts: dict[str, Pose], engine: str) -> None:
     hit = Obstacle(name="hit", shape="sphere", position_m=(0.60, 0.0, 0.50), radius_m=0.05)
     with pytest.raises(StartPoseError, match="touches hit at the start pose"):
-        Simulation(Scene("puma560", starts["puma560"], (hit,)), 1 / 240)
+        Simulation(Scene("puma560", starts["puma560"], (hit,)), 1 / 240, engine=engine)
 
 
-def test_an_unreachable_start_pose_is_refused(starts: dict[str, Pose]) -> None:
+def test_an_unreachable_start_pose_is_refused(starts: dict[str, Pose], engine: str) -> None:
     far = starts["puma560"]._replace(position=np.array([1.6, 0.0, 0.5]))
     with pytest.raises(UnreachablePoseError, match="puma560"):
-        Simulation(Scene("puma560", far, ()), 1 / 240)
+        Simulation(Scene("puma560", far, ()), 1 / 240, engine=engine)
 
 
 def test_the_arm_begins_at_rest_at_the_start_pose(
@@ -121,7 +121,7 @@ def test_an_arm_whose_own_links_meet_touches_itself_and_can_part_them(
     random, limits = np.random.default_rng(1), simulation.limits
     for _ in range(4000):
         posture = random.uniform(limits.lower, limits.upper)
-        simulation.arm.place(posture)
+        simulation.engine.place(posture)
         touches = simulation.read().touches
         if len(touches) == 1:
             break
@@ -130,7 +130,7 @@ def test_an_arm_whose_own_links_meet_touches_itself_and_can_part_them(
     parting = touch.separation_per_joint / np.linalg.norm(touch.separation_per_joint)
 
     def meets(along: float) -> bool:
-        simulation.arm.place(posture + along * parting)
+        simulation.engine.place(posture + along * parting)
         return "itself" in simulation.read().contacts
 
     assert meets(-0.005)
@@ -172,7 +172,7 @@ def ball_of_triangles(folder: Path, center: list[float], radius_m: float, finer:
 
 @pytest.mark.parametrize("shape", [*AROUND_THE_ELBOW, "mesh"])
 def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
-    starts: dict[str, Pose], period_s: float, shape: str, tmp_path: Path
+    starts: dict[str, Pose], engine: str, period_s: float, shape: str, tmp_path: Path
 ) -> None:
     start = starts["puma560"]
     sphere = AROUND_THE_ELBOW["sphere"]
@@ -181,7 +181,7 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
         if shape == "mesh"
         else region(**AROUND_THE_ELBOW[shape])
     )
-    simulation = Simulation(Scene("puma560", start, (), (around,)), period_s)
+    simulation = Simulation(Scene("puma560", start, (), (around,)), period_s, engine=engine)
     limits = Limits(simulation.limits, 0.25, 0.5, start.position - 2, start.position + 2)
     carried: Following | Standing = Standing()
     nearest = []
@@ -202,7 +202,7 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
 
 
 def test_however_fine_a_mesh_is_few_of_its_places_are_reported_and_none_is_farther_than_the_mesh(
-    starts: dict[str, Pose], period_s: float, tmp_path: Path
+    starts: dict[str, Pose], engine: str, period_s: float, tmp_path: Path
 ) -> None:
     center, radius_m = [0.35, 0.3, 0.75], 0.25
     found = {}
@@ -211,7 +211,9 @@ def test_however_fine_a_mesh_is_few_of_its_places_are_reported_and_none_is_farth
         sphere = region(shape="sphere", position_m=center, radius_m=radius_m)
         reported = []
         for around in (mesh, sphere):
-            simulation = Simulation(Scene("puma560", starts["puma560"], (), (around,)), period_s)
+            simulation = Simulation(
+                Scene("puma560", starts["puma560"], (), (around,)), period_s, engine=engine
+            )
             reported.append(simulation.read().links_near)
             simulation.close()
         near, exactly = reported
@@ -225,14 +227,14 @@ def test_however_fine_a_mesh_is_few_of_its_places_are_reported_and_none_is_farth
 
 
 def test_a_link_in_the_boxes_about_a_mesh_and_not_in_it_is_kept_where_it_is(
-    starts: dict[str, Pose], period_s: float, tmp_path: Path
+    starts: dict[str, Pose], engine: str, period_s: float, tmp_path: Path
 ) -> None:
     start = starts["puma560"]
     # A shell about the whole arm: boxes that cover a coarse one reach far into it.
     file = tmp_path / "shell.stl"
     trimesh.creation.icosphere(subdivisions=1, radius=2.0).export(file)
     shell = region(shape="mesh", position_m=[0.0, 0.0, 0.0], file=str(file))
-    simulation = Simulation(Scene("puma560", start, (), (shell,)), period_s)
+    simulation = Simulation(Scene("puma560", start, (), (shell,)), period_s, engine=engine)
     try:
         assert simulation.links_within == ()
         assert all((near.distances_m > 0).all() for near in simulation.read().links_near)
@@ -242,12 +244,14 @@ def test_a_link_in_the_boxes_about_a_mesh_and_not_in_it_is_kept_where_it_is(
 
 @pytest.mark.parametrize("written", ["stl", "stl_ascii", "obj"])
 def test_a_mesh_is_taken_from_every_kind_of_file(
-    starts: dict[str, Pose], period_s: float, tmp_path: Path, written: str
+    starts: dict[str, Pose], engine: str, period_s: float, tmp_path: Path, written: str
 ) -> None:
     file = tmp_path / f"ball.{written[:3]}"
     trimesh.creation.icosphere(subdivisions=3, radius=0.05).export(file, file_type=written)
     ball = region(shape="mesh", position_m=[0.2, -0.2, 0.9], file=str(file))
-    simulation = Simulation(Scene("puma560", starts["puma560"], (), (ball,)), period_s)
+    simulation = Simulation(
+        Scene("puma560", starts["puma560"], (), (ball,)), period_s, engine=engine
+    )
     try:
         assert simulation.links_within == ("upper_arm in region",)
     finally:
@@ -255,10 +259,12 @@ def test_a_mesh_is_taken_from_every_kind_of_file(
 
 
 def test_a_link_in_a_forbidden_region_at_the_start_stays_there_and_the_others_are_kept_out(
-    starts: dict[str, Pose], period_s: float
+    starts: dict[str, Pose], engine: str, period_s: float
 ) -> None:
     table = region(shape="plane", position_m=[0, 0, 0.48], normal=[0, 0, 1])
-    simulation = Simulation(Scene("puma560", starts["puma560"], (), (table,)), period_s)
+    simulation = Simulation(
+        Scene("puma560", starts["puma560"], (), (table,)), period_s, engine=engine
+    )
     try:
         assert simulation.links_within
         assert all(text.endswith(" in region") for text in simulation.links_within)

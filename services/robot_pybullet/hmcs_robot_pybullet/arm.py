@@ -15,13 +15,10 @@ from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
 from hmcs_robot.driver import JointLimits, Pose
+from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN
 from hmcs_robot.robots import RobotModel
 
 BASE_LINK = -1
-JOINTS_BETWEEN = 3
-"""Links with fewer joints between them cannot be brought together within the joints' ranges."""
-CLEAR_AT_HOME_M = 0.02
-"""Links that are nearer at home are built so."""
 
 
 class Arm:

@@ -10,8 +10,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from hmcs_robot.arm import Arm
 from hmcs_robot.robots import ROBOTS
+from hmcs_robot_pybullet.arm import Arm
 
 D = [0.672, 0, 0.15005, 0.4318, 0, 0]
 A = [0, 0.4318, 0.0203, 0, 0, 0]
