@@ -28,7 +28,7 @@ JOINTS_BETWEEN = 3
 CLEAR_AT_HOME_M = 0.02
 """Links that are nearer at home are built so."""
 _INSTALL = {
-    "pybullet": "install hmcs-robot-pybullet on CPython 3.11 (PyBullet has no wheels for later ones)",
+    "pybullet": "install hmcs-robot-pybullet on CPython 3.11 (there are no wheels for later ones)",
     "mujoco": "install hmcs-robot-mujoco",
 }
 

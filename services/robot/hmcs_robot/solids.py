@@ -1,4 +1,4 @@
-"""What stands in a cell as shapes that any physics engine knows: obstacles and forbidden regions."""
+"""Obstacles and forbidden regions as shapes that any physics engine knows."""
 
 from __future__ import annotations
 

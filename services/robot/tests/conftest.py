@@ -1,11 +1,11 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
-from hmcs.errors import UserError
 from hmcs.task import Obstacle
 from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow
 from hmcs_robot.driver import Pose
@@ -61,12 +61,10 @@ def period_s() -> float:
 
 @pytest.fixture(params=PREFERRED)
 def engine(request: pytest.FixtureRequest) -> str:
-    """The name of an engine, each in turn where it is installed."""
-    try:
-        name, _ = engine_named(request.param)
-    except UserError as error:
-        pytest.skip(str(error))
-    return name
+    """The name of an engine, each in turn."""
+    if request.param == "pybullet" and sys.version_info >= (3, 12):
+        pytest.skip("PyBullet has no wheels for this Python")
+    return str(request.param)
 
 
 @pytest.fixture

@@ -1,0 +1,202 @@
+"""MuJoCo's model of a cell: the arm of a URDF, obstacles, and forbidden regions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import trimesh
+
+from hmcs.arrays import Array
+from hmcs.errors import UserError
+from hmcs_robot.arm_description import file_named
+from hmcs_robot.driver import JointLimits
+from hmcs_robot.engine import Cell
+from hmcs_robot.robots import RobotModel
+from hmcs_robot.solids import Solid, solid_of, solids_of
+from hmcs_robot_mujoco.triangles import PROBE
+
+_GRAVITY_M_S2 = 9.81
+_MOVES = ("revolute", "continuous", "prismatic")
+_COMPILER = {
+    "fusestatic": "false",  # a tool without mass keeps its frame
+    "strippath": "false",
+    "discardvisual": "false",
+    "balanceinertia": "true",
+    "inertiafromgeom": "false",
+    "boundmass": "1e-9",
+    "boundinertia": "1e-12",
+}
+_KINDS = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+}
+_STIFF = ((0.01, 1.0), (0.99, 0.999, 0.0005, 0.5, 2.0))
+"""Time constant, s, and damping of a contact, and its impedance: the arm enters an obstacle by
+tenths of a millimeter."""
+_SMALLEST = Solid("box", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), halves_m=np.full(3, 1e-3))
+
+
+class Loaded(NamedTuple):
+    """A cell in MuJoCo; geometries are numbered as in the model."""
+
+    model: mujoco.MjModel
+    joint_names: tuple[str, ...]
+    limits: JointLimits
+    torques: Array
+    """The largest ones, N·m, shape (n,)."""
+    obstacles: dict[int, str]
+    """Names by geometry."""
+    regions: dict[str, tuple[int, ...]]
+    """Geometries by name."""
+
+
+def loaded(cell: Cell, period_s: float) -> Loaded:
+    """Return a cell in MuJoCo; raises UserError for an arm that MuJoCo cannot load."""
+    robot = _root(cell.model.urdf)
+    chain = _chain(robot, cell.model)
+    spec = _arm(robot, cell.model.urdf, chain.keys())
+    for geom in spec.geoms:
+        geom.contype, geom.conaffinity = 1, 0
+        geom.solref, geom.solimp = _STIFF
+    spec.option.timestep = period_s
+    spec.option.gravity = [0.0, 0.0, -_GRAVITY_M_S2]
+    spec.option.ccd_tolerance = 1e-9
+    obstacles = {f"obstacle {k}": each for k, each in enumerate(cell.obstacles)}
+    regions = {
+        f"region {k} {part}": (region.name, solid)
+        for k, region in enumerate(cell.forbidden)
+        for part, solid in enumerate(solids_of(region))
+    }
+    for name, obstacle in obstacles.items():
+        _add(spec, name, solid_of(obstacle), collides=True)
+    for name, (_, solid) in regions.items():
+        _add(spec, name, solid, collides=False)
+    _add(spec, PROBE, _SMALLEST, collides=False)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise UserError(f"{cell.model.urdf}: MuJoCo cannot simulate it: {error}") from error
+    # Its motors are ideal but for their strength.
+    model.dof_damping[:] = 0.0
+    model.dof_frictionloss[:] = 0.0
+    numbers: dict[str, list[int]] = {region.name: [] for region in cell.forbidden}
+    for name, (region_name, _) in regions.items():
+        numbers[region_name].append(model.geom(name).id)
+    joints = [chain[model.joint(k).name] for k in range(model.njnt)]
+    speeds = cell.model.joint_speed_rad_s or [_number(joint, "velocity") for joint in joints]
+    lower, upper = (np.array([_end(joint, end) for joint in joints]) for end in ("lower", "upper"))
+    return Loaded(
+        model,
+        tuple(model.joint(k).name for k in range(model.njnt)),
+        JointLimits(lower, upper, np.array(speeds, dtype=float)),
+        np.array([_number(joint, "effort") for joint in joints]),
+        {model.geom(name).id: obstacle.name for name, obstacle in obstacles.items()},
+        {name: tuple(geoms) for name, geoms in numbers.items()},
+    )
+
+
+def _root(urdf: Path) -> ElementTree.Element:
+    try:
+        return ElementTree.parse(urdf).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise UserError(f"{urdf}: is no URDF: {error}") from error
+
+
+def _chain(robot: ElementTree.Element, model: RobotModel) -> dict[str, ElementTree.Element]:
+    """Return the joints between base and tool that move, by name."""
+    above = {_link(joint, "child"): joint for joint in robot.findall("joint")}
+    chain = {}
+    link = model.tool_link
+    while link in above:
+        joint = above.pop(link)
+        if joint.get("type") in _MOVES:
+            chain[joint.get("name", "")] = joint
+        link = _link(joint, "parent")
+    if not chain:
+        raise UserError(f"{model.urdf}: no joint moves the link {model.tool_link}")
+    return chain
+
+
+def _link(joint: ElementTree.Element, end: str) -> str:
+    found = joint.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _number(joint: ElementTree.Element, name: str) -> float:
+    limit = joint.find("limit")
+    return float("nan" if limit is None else limit.get(name, "nan"))
+
+
+def _end(joint: ElementTree.Element, name: str) -> float:
+    """Return an end of a joint's range, rad or m; one that turns on and on has two turns."""
+    if joint.get("type") == "continuous":
+        return -2.0 * np.pi if name == "lower" else 2.0 * np.pi
+    return _number(joint, name)
+
+
+def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujoco.MjSpec:
+    """Return MuJoCo's description of an arm, its meshes read; all joints but some are held."""
+    options = ElementTree.SubElement(robot, "mujoco")
+    ElementTree.SubElement(options, "compiler", _COMPILER)
+    meshes: dict[str, bytes] = {}
+    for number, mesh in enumerate(robot.findall("link/collision/geometry/mesh")):
+        name = mesh.get("filename", "")
+        file = file_named(urdf, name)
+        if file is None:
+            raise UserError(f"{urdf}: names the mesh {name}, and there is no such file")
+        mesh.set("filename", f"mesh_{number}.obj")
+        meshes[f"mesh_{number}.obj"] = _hull(file)
+    for link in robot.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    for joint in robot.findall("joint"):
+        if joint.get("name") not in moved:
+            joint.set("type", "fixed")
+            for mimic in joint.findall("mimic"):
+                joint.remove(mimic)
+    text = ElementTree.tostring(robot, encoding="unicode")
+    try:
+        return mujoco.MjSpec.from_string(text, assets=meshes)
+    except ValueError as error:
+        raise UserError(f"{urdf}: MuJoCo cannot read it: {error}") from error
+
+
+def _hull(file: Path) -> bytes:
+    """Return the convex hull of a mesh, which is what collides, as OBJ."""
+    try:
+        hull = trimesh.load_mesh(file).convex_hull
+    except Exception as error:
+        # What trimesh raises depends on the format and on where in the file it stumbles.
+        raise UserError(f"{file}: cannot be read as a mesh: {error}") from error
+    lines = [
+        *(f"v {x!r} {y!r} {z!r}" for x, y, z in hull.vertices.tolist()),
+        *(f"f {a} {b} {c}" for a, b, c in (hull.faces + 1).tolist()),
+    ]
+    return "\n".join(lines).encode()
+
+
+def _add(spec: mujoco.MjSpec, name: str, solid: Solid, *, collides: bool) -> None:
+    size = (
+        solid.halves_m.tolist()
+        if solid.kind == "box"
+        else [solid.radius_m, 0.5 * solid.length_m, 0.0]
+    )
+    x, y, z, w = solid.orientation.tolist()
+    geom = spec.worldbody.add_geom(
+        name=name,
+        type=_KINDS[solid.kind],
+        size=size,
+        pos=solid.position.tolist(),
+        quat=[w, x, y, z],
+        contype=0,
+        conaffinity=1 if collides else 0,
+        rgba=[0.45, 0.55, 0.65, 1.0] if collides else [0.85, 0.25, 0.15, 0.2],
+    )
+    geom.solref, geom.solimp = _STIFF
