@@ -1,6 +1,6 @@
-# Each target does all set-up itself; it needs CPython 3.11 with venv, and nothing else.
-# PYTHON=/path/to/python3.11 chooses the Python, PYTHON=auto lets uv download one where none is at
-# hand, OUTPUT=DIR chooses the folder of the demo's report.
+# Each target does all set-up itself; it needs CPython 3.11, 3.12 or 3.13 with venv, and nothing
+# else. PYTHON=/path/to/python3.13 or PYTHON=3.13 chooses the Python, PYTHON=auto lets uv download
+# one where none is at hand, OUTPUT=DIR chooses the folder of the demo's report.
 
 PYTHON ?=
 VENV := .venv
@@ -91,16 +91,26 @@ clean: ## remove .venv, reports, the site and caches
 	rm -rf $(VENV) out dist docs/api .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# A Python that is named is compared with that of the environment, at every call.
+ifneq ($(filter-out auto,$(PYTHON)),)
+.PHONY: $(READY)
+endif
+
 # An environment of another Python, or moved from another folder, is made anew.
 $(READY): $(MANIFESTS)
 	@set -e; \
-	is_311() { "$$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1; }; \
-	if ! is_311 $(RUN)/python; then \
+	version() { "$$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || true; }; \
+	has=$$(version $(RUN)/python); \
+	case $$has in 3.11 | 3.12 | 3.13) ;; *) has=none ;; esac; \
+	if [ $$has = none ] || [ -n "$(filter-out auto,$(PYTHON))" ]; then \
 	  python=$$(sh deploy/find_python.sh $(if $(PYTHON),"$(PYTHON)")); \
+	  [ "$$has" = "$$(version "$$python")" ] || has=none; \
+	fi; \
+	if [ $$has = none ]; then \
 	  rm -rf $(VENV); \
 	  if ! "$$python" -m venv $(VENV); then \
 	    rm -rf $(VENV); \
-	    echo "$$python cannot make an environment: install its venv module (Debian: apt install python3.11-venv)" >&2; \
+	    echo "$$python cannot make an environment: install its venv module (Debian: apt install python3-venv)" >&2; \
 	    exit 1; \
 	  fi; \
 	fi; \

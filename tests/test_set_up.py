@@ -13,15 +13,22 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 OTHER_PYTHON = """#!/bin/sh
-# Answers as a Python does that is not 3.11; what it installs is the fake uv.
+# Answers as a Python does that HMCS does not run on; what it installs is the fake uv.
 here=$(dirname "$0")
 case "$1 $2" in
-  "-c "*) exit 1 ;;
+  "-c "*) echo 3.10 ;;
   "-m venv") mkdir -p "$3/bin"; cp "$0" "$3/bin/python" ;;
   *install_uv.py*) cp "$FAKES/a-uv" "$here/uv"; echo "$here" >> "$FAKES/uv-installed" ;;
 esac
 """
-PYTHON_311 = OTHER_PYTHON.replace("exit 1", "exit 0")
+
+
+def python_of(version: str) -> str:
+    """Return a program that answers as a Python of that version does."""
+    return OTHER_PYTHON.replace("echo 3.10", f"echo {version}")
+
+
+PYTHON_311 = python_of("3.11")
 UV = """#!/bin/sh
 # As uv does, it prints no path where it is to be quiet.
 echo "$UV_PYTHON_DOWNLOADS: $*" >> "$FAKES/uv-called"
@@ -61,10 +68,11 @@ class Machine:
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [str(self.bin / command[0]), *command[1:]],
+            [shutil.which(command[0], path=self.bin) or self.folder / command[0], *command[1:]],
             cwd=self.folder,
             env={
                 "PATH": str(self.bin),
+                "HOME": str(self.folder),
                 "FAKES": str(self.folder),
                 "TMPDIR": str(self.folder / "tmp"),
             },
@@ -89,7 +97,7 @@ def machine(tmp_path: Path) -> Machine:
 
 @pytest.mark.parametrize("asked", [(), ("auto",)])
 @pytest.mark.parametrize("name", ["python3.11", "python3", "python"])
-def test_python_311_at_hand_is_taken_and_nothing_is_downloaded(
+def test_a_python_at_hand_is_taken_and_nothing_is_downloaded(
     machine: Machine, asked: tuple[str, ...], name: str
 ) -> None:
     machine.has("uv", UV)
@@ -97,6 +105,67 @@ def test_python_311_at_hand_is_taken_and_nothing_is_downloaded(
     machine.has(name, PYTHON_311)
     assert machine.find_python(*asked).stdout == f"{name}\n"
     assert machine.noted("uv-called") == []
+
+
+@pytest.mark.parametrize(
+    ("there", "taken"),
+    [
+        ({"python3.13": "3.13", "python3.12": "3.12", "python3": "3.11"}, "python3"),
+        ({"python3.13": "3.13", "python3": "3.12"}, "python3"),
+        ({"python3.13": "3.13", "python3": "3.14"}, "python3.13"),
+    ],
+)
+def test_of_several_the_one_with_both_engines_comes_first_then_the_oldest(
+    machine: Machine, there: dict[str, str], taken: str
+) -> None:
+    for name, version in there.items():
+        machine.has(name, python_of(version))
+    assert machine.find_python().stdout == f"{taken}\n"
+
+
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_a_version_or_a_program_that_is_named_is_taken(machine: Machine, version: str) -> None:
+    machine.has("python3.11", PYTHON_311)
+    machine.has("a-python", python_of(version))
+    machine.has(f"python{version}", python_of(version))
+    assert machine.find_python("a-python").stdout == "a-python\n"
+    assert machine.find_python(version).stdout == f"python{version}\n"
+
+
+def test_a_python_of_pyenv_is_found(machine: Machine) -> None:
+    machine.has(
+        "python3.13", "#!/bin/sh\necho 'pyenv: python3.13: command not found' >&2; exit 127\n"
+    )
+    folder = machine.folder / ".pyenv/versions/3.13.0/bin"
+    folder.mkdir(parents=True)
+    machine.has("python3.13", python_of("3.13"), at=folder)
+    assert machine.find_python().stdout == f"{folder / 'python3.13'}\n"
+
+
+def test_a_version_that_is_not_there_is_refused_though_another_is(machine: Machine) -> None:
+    machine.has("python3.11", PYTHON_311)
+    done = machine.find_python("3.13")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "found no 3.13" in done.stderr
+
+
+def test_make_makes_the_environment_anew_for_another_python_that_is_named(
+    machine: Machine,
+) -> None:
+    for version in ("3.11", "3.13"):
+        machine.has(f"python{version}", python_of(version))
+
+    def made() -> str:
+        return machine.run(".venv/bin/python", "-c", "").stdout.strip()
+
+    assert machine.run("make", "setup").returncode == 0
+    assert made() == "3.11"
+    assert machine.run("make", "setup", "PYTHON=3.13").returncode == 0
+    assert made() == "3.13"
+    (machine.folder / ".venv/mark").touch()
+    for again in ([], ["PYTHON=3.13"], ["PYTHON=auto"]):
+        assert machine.run("make", "setup", *again).returncode == 0
+    assert (machine.folder / ".venv/mark").exists()
 
 
 @pytest.mark.parametrize("asked", [(), ("python3",), ("/no/such place/python",)])
@@ -109,7 +178,7 @@ def test_without_leave_nothing_is_downloaded_and_one_line_says_how_to_give_it(
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     for reported in (
         *asked,
-        "needs CPython 3.11",
+        "needs CPython 3.11, 3.12 or 3.13",
         "PYTHON=/path/to/python3.11",
         "demo PYTHON=auto",
     ):
