@@ -24,13 +24,14 @@ from hmcs_local.observer import Sighting, look
 from hmcs_local.processes import StackProcess
 from hmcs_local.stack import LocalStack
 
+ROBOT = "robot"
 SERVICES = (
     "router",
     "input-device",
     "gesteme-classifier",
     "task-hmm",
     "fixture-controller",
-    "robot",
+    ROBOT,
 )
 CLASSIFIER = "gesteme-classifier"
 CELL = "demo"
@@ -66,6 +67,8 @@ class Played(NamedTuple):
     lost_messages: int
     refused_messages: int
     cpu_cores: float
+    engine: str
+    """What simulated the robot."""
 
 
 def play(plan: Plan, folder: Path, recording: Path, line: ProgressLine) -> Played:
@@ -120,6 +123,7 @@ class _Run:
         self._check(_SILENT_AFTER_S)
         cores = meter.cores(self._stack.processes.values())
         self._bus.pump(_SETTLE_S)
+        (engine,) = (s.facts["engine"] for s in look(self._bus) if s.member.service == ROBOT)
         # Instances are named once: the newcomer does not stand in for the one that was killed.
         healths = {**before, **_healths(self._bus)}.values()
         return Played(
@@ -129,6 +133,7 @@ class _Run:
             lost_messages=sum(sum(health.lost.values()) for health in healths),
             refused_messages=sum(sum(health.refused.values()) for health in healths),
             cpu_cores=cores,
+            engine=engine,
         )
 
     def _until(self, moving_s: float, patience_s: float) -> None:

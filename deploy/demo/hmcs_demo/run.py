@@ -152,7 +152,7 @@ def _facts(
     ready = members.received_ns[(members.instance == played.newcomer) & members.alive]
     if not len(ready):
         raise RunError(f"{played.newcomer} was never ready: its log says why")
-    packages = ("hmcs", "eclipse-zenoh", "numpy", "pybullet")
+    packages = ("hmcs", "eclipse-zenoh", "numpy", played.engine)
     return RunFacts(
         killed=played.killed,
         newcomer=played.newcomer,
