@@ -155,10 +155,10 @@ def test_engines_agree_on_limits_and_distances(cells: list[Simulation]) -> None:
         for key in mine.keys() & theirs.keys():
             compared += 1
             if mine[key] > 0.0:
-                # PyBullet rounds hulls and cylinders by its collision margin.
-                assert mine[key] == pytest.approx(theirs[key], abs=2e-3), key
+                # PyBullet grows meshes by its collision margin, 1 mm.
+                assert mine[key] == pytest.approx(theirs[key], abs=1.2e-3), key
             else:
-                assert theirs[key] < 2e-3
+                assert theirs[key] < 1.2e-3
     assert compared > 60
 
 

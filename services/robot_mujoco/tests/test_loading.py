@@ -1,0 +1,94 @@
+"""An arm as MuJoCo has it, and what is told where it cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hmcs.errors import UserError
+from hmcs.task import ForbiddenRegion
+from hmcs_robot.engine import Cell
+from hmcs_robot.robots import ROBOTS
+from hmcs_robot_mujoco.engine import MujocoEngine
+from hmcs_robot_mujoco.loading import loaded
+
+PERIOD_S = 1 / 240
+
+
+@pytest.mark.parametrize("robot", sorted(ROBOTS))
+def test_an_arm_stands_still_under_gravity_and_follows_velocities(robot: str) -> None:
+    engine = MujocoEngine(Cell(ROBOTS[robot], (), ()), PERIOD_S, gui=False)
+    begin, _ = engine.joints()
+    still = np.zeros_like(begin)
+    for _ in range(240):
+        engine.step(still)
+    np.testing.assert_allclose(engine.joints()[0], begin, atol=1e-9)
+    slow = np.full_like(begin, 0.05)
+    for _ in range(240):
+        engine.step(slow)
+    positions, velocities = engine.joints()
+    np.testing.assert_allclose(velocities, slow, atol=1e-9)
+    np.testing.assert_allclose(positions - begin, 0.05, atol=1e-3)
+    engine.close()
+
+
+def test_a_joint_that_is_no_part_of_the_way_to_the_tool_is_held() -> None:
+    found = loaded(Cell(ROBOTS["panda"], (), ()), PERIOD_S)
+    assert found.joint_names == tuple(f"panda_joint{k}" for k in range(1, 8))
+    assert found.model.nv == 7
+
+
+def test_weak_motors_let_the_arm_sink(tmp_path: Path) -> None:
+    urdf = tmp_path / "weak.urdf"
+    text = ROBOTS["puma560"].urdf.read_text(encoding="utf-8")
+    urdf.write_text(text.replace('effort="186.4"', 'effort="1.0"'), encoding="utf-8")
+    model = ROBOTS["puma560"]._replace(urdf=urdf)
+    engine = MujocoEngine(Cell(model, (), ()), PERIOD_S, gui=False)
+    height = engine.tool().position[2]
+    for _ in range(60):
+        engine.step(np.zeros(6))
+    assert engine.tool().position[2] < height - 0.05
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ('filename="meshes/link_3.stl"', 'filename="none.stl"', "names the mesh none.stl"),
+        ("<robot ", "<robots ", "MuJoCo cannot read it"),
+        ("</robot>", "", "is no URDF"),
+        ("lbr_iiwa_link_7", "link_7", "no joint moves the link lbr_iiwa_link_7"),
+    ],
+)
+def test_an_arm_that_cannot_be_is_a_mistake_of_its_user(
+    tmp_path: Path, before: str, after: str, told: str
+) -> None:
+    folder = ROBOTS["iiwa"].urdf.parent
+    urdf = tmp_path / "arm.urdf"
+    (tmp_path / "meshes").symlink_to(folder / "meshes")
+    text = ROBOTS["iiwa"].urdf.read_text(encoding="utf-8").replace(before, after)
+    if before == "<robot ":
+        text = text.replace("</robot>", "</robots>")
+    urdf.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError, match=told):
+        loaded(Cell(ROBOTS["iiwa"]._replace(urdf=urdf), (), ()), PERIOD_S)
+
+
+def test_a_mesh_that_a_link_is_near_is_told_triangle_by_triangle(tmp_path: Path) -> None:
+    # One large triangle beside the base of the arm: the box about it holds half of the cell.
+    corners = np.array([[0.6, -0.6, 0.3], [0.6, 0.6, 0.3], [-0.6, 0.6, 0.3]])
+    file = tmp_path / "triangle.obj"
+    lines = [f"v {x} {y} {z}" for x, y, z in corners.tolist()]
+    file.write_text("\n".join([*lines, "f 1 2 3"]) + "\n", encoding="utf-8")
+    mesh = ForbiddenRegion.model_validate(
+        {"name": "sheet", "shape": "mesh", "file": str(file), "position_m": [0, 0, 0]}
+    )
+    engine = MujocoEngine(Cell(ROBOTS["puma560"], (), (mesh,)), PERIOD_S, gui=False)
+    names = {engine.link_name(link): link for link in range(1, 11)}
+    base = names["base"]
+    # The base is a cylinder of 0.1 m about z; the triangle's long edge passes through that.
+    assert engine.links_touching([base], mesh, 0.002) == {base}
+    away = mesh.model_copy(update={"position_m": (0.0707 + 0.105, 0.0707 + 0.105, 0.0)})
+    assert engine.links_touching([base], away, 0.002) == frozenset()
+    assert engine.links_touching([base], away, 0.2) == {base}
