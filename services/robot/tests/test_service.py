@@ -31,6 +31,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.router import open_router
 from hmcs.bus.service import CannotGoOnError
 from hmcs.bus.session import Bus, Publisher, Received
+from hmcs_robot.engine import PREFERRED
 from hmcs_robot.service import Robot
 from hmcs_robot.settings import RobotSettings
 
@@ -59,13 +60,15 @@ robot:
 class Cell:
     """A robot, what it says, and writers of commands."""
 
-    def __init__(self, router: str, task: Path, hang_s: float) -> None:
+    def __init__(self, router: str, task: Path, hang_s: float = 5.0, engine: str = "auto") -> None:
         self.settings = BusSettings(router=router)
+        self.engine = engine
         self.buses: list[Bus] = []
         self.bus = self.open("robot")
         settings = RobotSettings(
             router=router,
             task=str(task),
+            engine=engine,
             # Patient, so that a busy machine is not taken for a hang or a late command.
             hang_s=hang_s,
             late_tick_s=5.0,
@@ -136,6 +139,18 @@ class Cell:
             bus.close()
 
 
+def _needs(engine: str) -> tuple[pytest.MarkDecorator, ...]:
+    no_wheels = engine == "pybullet" and sys.version_info >= (3, 12)
+    return (pytest.mark.skipif(no_wheels, reason="PyBullet has no wheels for this Python"),)
+
+
+on_both_engines = pytest.mark.parametrize(
+    "cell",
+    [pytest.param({"engine": name}, id=name, marks=_needs(name)) for name in PREFERRED],
+    indirect=True,
+)
+
+
 @pytest.fixture
 def router() -> Iterator[str]:
     with socket.socket() as free:
@@ -154,11 +169,12 @@ def task(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def cell(router: str, task: Path, request: pytest.FixtureRequest) -> Iterator[Cell]:
-    made = Cell(router, task, hang_s=getattr(request, "param", 5.0))
+    made = Cell(router, task, **getattr(request, "param", {}))
     yield made
     made.close()
 
 
+@on_both_engines
 def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cell) -> None:
     begun = cell.until(lambda _: True)
     assert begun.stop == "no_command"
@@ -173,6 +189,7 @@ def test_the_tool_follows_the_command_and_the_state_carries_its_origin(cell: Cel
     assert moving.reference_twist == pytest.approx([0, -0.1, 0, 0, 0, 0], abs=1e-6)
     assert cell.origins[-1] == Origin(boot="hand", seq=7, captured_ns=1)
     assert cell.robot.health() == (True, "following commands")
+    assert cell.robot.facts()["engine"] == cell.engine
 
 
 @pytest.mark.long
@@ -217,6 +234,7 @@ def test_it_stops_when_asked_and_follows_again_after_a_new_engage(cell: Cell) ->
     cell.engage(-0.1)
 
 
+@on_both_engines
 def test_a_collision_stops_it_and_it_can_be_driven_away(cell: Cell) -> None:
     hit = cell.drive(0.2, lambda s: s.stop == "collision")
     assert hit.contacts == ("wall",)
@@ -235,7 +253,7 @@ def test_what_is_no_command_is_refused_and_reported_as_the_reason(cell: Cell) ->
     assert state.stop == "refused_command"
 
 
-@pytest.mark.parametrize("cell", [0.25], indirect=True)
+@pytest.mark.parametrize("cell", [{"hang_s": 0.25}], indirect=True)
 def test_a_hang_of_the_wire_room_stops_it_and_what_queued_up_moves_nothing(cell: Cell) -> None:
     cell.engage(-0.05)
     began = time.monotonic()

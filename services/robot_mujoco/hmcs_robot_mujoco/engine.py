@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Iterable, Iterator
 from itertools import combinations, groupby
 from typing import Any
@@ -245,11 +246,15 @@ def _joints_below(model: mujoco.MjModel) -> list[int]:
 
 
 def _window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
-    try:
-        from mujoco import viewer
+    """Return a window that shows the cell; raises UserError where none opens."""
+    # Imported here: it looks for a display, and a robot rarely has a window.
+    import glfw
+    from mujoco import viewer
 
-        return viewer.launch_passive(model, data)
-    except (ImportError, RuntimeError, mujoco.FatalError) as error:
-        raise UserError(
-            f"no window could be opened ({error}): is there a display? Run without gui"
-        ) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # MuJoCo's viewer would end the process.
+        there = glfw.init()
+    if not there:
+        raise UserError("no window could be opened: is there a display? Run without gui")
+    return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
