@@ -88,7 +88,7 @@ test-containers: $(READY) ## build the images and run the stack in a Docker engi
 	@$(RUN)/python -m pytest -m containers tests/containers
 
 clean: ## remove .venv, reports, the site and caches
-	rm -rf $(VENV) out dist docs/api .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-3.13 out dist docs/api .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A Python that is named is compared with that of the environment, at every call.

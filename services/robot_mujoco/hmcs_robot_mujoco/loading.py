@@ -9,7 +9,6 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-import trimesh
 
 from hmcs.arrays import Array
 from hmcs.errors import UserError
@@ -37,6 +36,7 @@ _KINDS = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
 }
+_READ_BY_MUJOCO = (".obj", ".stl")
 _STIFF = ((0.01, 1.0), (0.99, 0.999, 0.0005, 0.5, 2.0))
 """Time constant, s, and damping of a contact, and its impedance: the arm enters an obstacle by
 tenths of a millimeter."""
@@ -151,8 +151,13 @@ def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujo
         file = file_named(urdf, name)
         if file is None:
             raise UserError(f"{urdf}: names the mesh {name}, and there is no such file")
-        mesh.set("filename", f"mesh_{number}.obj")
-        meshes[f"mesh_{number}.obj"] = _hull(file)
+        unique = f"mesh_{number}{file.suffix.lower()}"
+        if unique.endswith(_READ_BY_MUJOCO) and not _is_text_stl(file):
+            meshes[unique] = file.read_bytes()
+        else:
+            unique = f"mesh_{number}.obj"
+            meshes[unique] = _hull(file)
+        mesh.set("filename", unique)
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
@@ -163,13 +168,26 @@ def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujo
                 joint.remove(mimic)
     text = ElementTree.tostring(robot, encoding="unicode")
     try:
-        return mujoco.MjSpec.from_string(text, assets=meshes)
+        spec = mujoco.MjSpec.from_string(text, assets=meshes)
     except ValueError as error:
         raise UserError(f"{urdf}: MuJoCo cannot read it: {error}") from error
+    for each in spec.meshes:
+        # Masses are the URDF's: a mesh that is open or inside out has a hull all the same.
+        each.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    return spec
+
+
+def _is_text_stl(file: Path) -> bool:
+    with file.open("rb") as opened:
+        begin = opened.read(1024)
+    return file.suffix.lower() == ".stl" and begin.startswith(b"solid") and b"facet" in begin
 
 
 def _hull(file: Path) -> bytes:
     """Return the convex hull of a mesh, which is what collides, as OBJ."""
+    # Imported here: it takes longer than all the rest, and few arms need it.
+    import trimesh
+
     try:
         hull = trimesh.load_mesh(file).convex_hull
     except Exception as error:

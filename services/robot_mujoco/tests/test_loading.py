@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from hmcs.errors import UserError
-from hmcs.task import ForbiddenRegion
+from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.engine import Cell
-from hmcs_robot.robots import ROBOTS
+from hmcs_robot.robots import ROBOTS, RobotModel
 from hmcs_robot_mujoco.engine import MujocoEngine
 from hmcs_robot_mujoco.loading import loaded
 
@@ -92,3 +93,30 @@ def test_a_mesh_that_a_link_is_near_is_told_triangle_by_triangle(tmp_path: Path)
     away = mesh.model_copy(update={"position_m": (0.0707 + 0.105, 0.0707 + 0.105, 0.0)})
     assert engine.links_touching([base], away, 0.002) == frozenset()
     assert engine.links_touching([base], away, 0.2) == {base}
+
+
+PENDULUM = """<robot name="pendulum"><link name="base"/>
+<link name="bob"><inertial><origin xyz="0 0 0.5"/><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 0.5"/><geometry><mesh filename="bob.SUFFIX" scale="0.1 0.1 0.1"/>
+</geometry></collision></link>
+<joint name="swing" type="revolute"><parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="2" effort="50"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("written", ["stl", "stl_ascii", "obj", "ply"])
+def test_a_link_is_where_its_mesh_is_whatever_kind_of_file_that_is(
+    tmp_path: Path, written: str
+) -> None:
+    suffix = written.removesuffix("_ascii")
+    trimesh.creation.box((1.0, 1.0, 2.0)).export(tmp_path / f"bob.{suffix}", file_type=written)
+    urdf = tmp_path / "pendulum.urdf"
+    urdf.write_text(PENDULUM.replace("SUFFIX", suffix), encoding="utf-8")
+    ball = Obstacle(name="ball", shape="sphere", position_m=(0.3, 0.0, 0.5), radius_m=0.05)
+    model = RobotModel(urdf, "bob", 0.0, (0.0,), None)
+    engine = MujocoEngine(Cell(model, (ball,), ()), PERIOD_S, gui=False)
+    (near,) = engine.near_obstacles(1.0)
+    # A box of 0.1 m about the z axis, and a ball of 0.05 m at 0.3 m.
+    assert near.distances_m == pytest.approx([0.2], abs=1e-6)
+    np.testing.assert_allclose(near.on_arm, [[0.05, 0.0, 0.5]], atol=1e-3)
+    np.testing.assert_allclose(near.normals, [[-1.0, 0.0, 0.0]], atol=1e-3)
