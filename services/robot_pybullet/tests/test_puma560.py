@@ -6,6 +6,8 @@ PUMA 560 robot. IEEE ICRA 1994; B. Armstrong, O. Khatib, J. Burdick, IEEE ICRA 1
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pybullet
 import pytest
@@ -69,6 +71,15 @@ def center_jacobians(q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.nda
             angular[:, joint] = axis
         result.append((linear, angular, turn))
     return result
+
+
+@pytest.fixture
+def client() -> Iterator[int]:
+    """A PyBullet client with gravity."""
+    number = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(0, 0, -9.81, physicsClientId=number)
+    yield number
+    pybullet.disconnect(physicsClientId=number)
 
 
 @pytest.fixture
