@@ -28,6 +28,29 @@ class Closest(NamedTuple):
     """Unit vector from the other to the one."""
 
 
+class OwnPairs:
+    """Pairs of geometries of an arm, of links that may meet."""
+
+    def __init__(self, model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> None:
+        self._model = model
+        self._ones, self._others = np.array(pairs, dtype=int).reshape(-1, 2).T
+        self._reach_m = model.geom_rbound[self._ones] + model.geom_rbound[self._others]
+        self._links = model.geom_bodyid
+
+    def near(self, data: mujoco.MjData, within_m: float) -> dict[tuple[int, int], Closest]:
+        """Return where links are so near to each other: the closest geometries of each two."""
+        away = data.geom_xpos[self._ones] - data.geom_xpos[self._others]
+        bound = np.sqrt(np.vecdot(away, away)) - self._reach_m
+        nearest: dict[tuple[int, int], Closest] = {}
+        for pair in np.flatnonzero(bound <= within_m).tolist():
+            one, other = int(self._ones[pair]), int(self._others[pair])
+            found = closest(self._model, data, one, other, within_m)
+            links = int(self._links[one]), int(self._links[other])
+            if found and (links not in nearest or found.distance_m < nearest[links].distance_m):
+                nearest[links] = found
+        return nearest
+
+
 class Pairs:
     """Geometries of an arm, and others that it may come near to."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterable, Iterator
-from itertools import combinations, groupby
+from itertools import combinations, groupby, product
 from typing import Any
 
 import mujoco
@@ -17,7 +17,7 @@ from hmcs.task import ForbiddenRegion
 from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN, Cell, Meeting, Near
 from hmcs_robot.solids import corners_of
-from hmcs_robot_mujoco.distances import Closest, Pairs, closest
+from hmcs_robot_mujoco.distances import Closest, OwnPairs, Pairs
 from hmcs_robot_mujoco.loading import loaded
 from hmcs_robot_mujoco.motors import torques_for
 from hmcs_robot_mujoco.triangles import Probe
@@ -57,7 +57,7 @@ class MujocoEngine:
             name: Pairs(self._model, moving, list(geoms)) for name, geoms in cell_of.regions.items()
         }
         self.place(np.array(cell.model.home))
-        self._apart = self._far_links()
+        self._own_pairs = self._that_may_meet()
         self._window = _window(self._model, self._data) if gui else None
 
     def link_name(self, link: int) -> str:
@@ -122,14 +122,8 @@ class MujocoEngine:
 
     def near_itself(self, within_m: float) -> Iterator[Meeting]:
         """Yield where links that can meet are so near to each other."""
-        for each in self._nearest_of_links(self._apart, within_m):
-            yield Meeting(
-                self._link_of[each.one],
-                self._link_of[each.other],
-                each.on_one,
-                each.on_other,
-                each.normal,
-            )
+        for (one, other), each in self._own_pairs.near(self._data, within_m).items():
+            yield Meeting(one, other, each.on_one, each.on_other, each.normal)
 
     def step(self, joint_velocities: Array) -> None:
         """Advance the physics by one period, with the motors at `joint_velocities`, rad/s, (n,)."""
@@ -205,35 +199,23 @@ class MujocoEngine:
                 np.array([each.normal for each in own]),
             )
 
-    def _far_links(self) -> list[tuple[int, int]]:
-        """Pairs of links with so many joints between them that they may meet but do not at home."""
+    def _pairs_of(self, links: Iterable[tuple[int, int]]) -> OwnPairs:
+        """Return the geometries of pairs of links."""
+        of = self._geoms_of
+        return OwnPairs(
+            self._model, [pair for one, other in links for pair in product(of[one], of[other])]
+        )
+
+    def _that_may_meet(self) -> OwnPairs:
+        """Links with so many joints between them that they may meet but do not at home."""
         below = self._joints_below
         far = [
             (one, other)
             for one, other in combinations(range(1, self._model.nbody), 2)
             if abs(below[one] - below[other]) >= JOINTS_BETWEEN
         ]
-        near = {
-            (self._link_of[each.one], self._link_of[each.other])
-            for each in self._nearest_of_links(far, CLEAR_AT_HOME_M)
-        }
-        return [pair for pair in far if pair not in near]
-
-    def _nearest_of_links(
-        self, pairs: Iterable[tuple[int, int]], within_m: float
-    ) -> Iterator[Closest]:
-        """Yield the closest geometries of each pair of links that are so near to each other."""
-        places, reaches = self._data.geom_xpos, self._model.geom_rbound
-        for one, other in pairs:
-            found = [
-                near
-                for a in self._geoms_of[one]
-                for b in self._geoms_of[other]
-                if np.linalg.norm(places[a] - places[b]) <= reaches[a] + reaches[b] + within_m
-                if (near := closest(self._model, self._data, a, b, within_m)) is not None
-            ]
-            if found:
-                yield min(found, key=lambda each: each.distance_m)
+        near = self._pairs_of(far).near(self._data, CLEAR_AT_HOME_M)
+        return self._pairs_of(pair for pair in far if pair not in near)
 
 
 def _joints_below(model: mujoco.MjModel) -> list[int]:
