@@ -57,7 +57,7 @@ def test_auto_is_the_first_that_is_installed_and_a_name_is_that_engine(
 
 
 @pytest.mark.parametrize(
-    ("there", "asked", "told"),
+    ("there", "asked", "expected"),
     [
         ({"mujoco": HERE}, "bullet", "expected one of auto, mujoco, pybullet"),
         ({"mujoco": HERE}, "pybullet", "install hmcs-robot-pybullet on CPython 3.11"),
@@ -66,10 +66,10 @@ def test_auto_is_the_first_that_is_installed_and_a_name_is_that_engine(
     ],
 )
 def test_an_engine_that_is_not_there_is_refused_with_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, there: dict[str, str], asked: str, told: str
+    monkeypatch: pytest.MonkeyPatch, there: dict[str, str], asked: str, expected: str
 ) -> None:
     installed(monkeypatch, **there)
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=expected):
         engine_named(asked)
 
 

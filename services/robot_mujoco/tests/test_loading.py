@@ -1,4 +1,4 @@
-"""An arm as MuJoCo has it, and what is told where it cannot."""
+"""An arm as MuJoCo has it, and what is refused."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_weak_motors_let_the_arm_sink(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "expected"),
     [
         ('filename="meshes/link_3.stl"', 'filename="none.stl"', "names the mesh none.stl"),
         ("<robot ", "<robots ", "MuJoCo cannot read it"),
@@ -63,7 +63,7 @@ def test_weak_motors_let_the_arm_sink(tmp_path: Path) -> None:
     ],
 )
 def test_an_arm_that_cannot_be_is_a_mistake_of_its_user(
-    tmp_path: Path, before: str, after: str, told: str
+    tmp_path: Path, before: str, after: str, expected: str
 ) -> None:
     folder = ROBOTS["iiwa"].urdf.parent
     urdf = tmp_path / "arm.urdf"
@@ -72,11 +72,11 @@ def test_an_arm_that_cannot_be_is_a_mistake_of_its_user(
     if before == "<robot ":
         text = text.replace("</robot>", "</robots>")
     urdf.write_text(text, encoding="utf-8")
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=expected):
         loaded(Cell(ROBOTS["iiwa"]._replace(urdf=urdf), (), ()), PERIOD_S)
 
 
-def test_a_mesh_that_a_link_is_near_is_told_triangle_by_triangle(tmp_path: Path) -> None:
+def test_a_mesh_is_near_a_link_where_a_triangle_of_it_is(tmp_path: Path) -> None:
     # One large triangle beside the base of the arm: the box about it holds half of the cell.
     corners = np.array([[0.6, -0.6, 0.3], [0.6, 0.6, 0.3], [-0.6, 0.6, 0.3]])
     file = tmp_path / "triangle.obj"
