@@ -97,11 +97,7 @@ class MujocoEngine:
 
     def near_obstacles(self, within_m: float) -> Iterator[Near]:
         """Yield where links are so near to obstacles."""
-        found = list(self._to_obstacles.near(self._data, within_m))
-        touching = self._contacts()
-        touched = {(each.one, each.other) for each in touching}
-        found = [each for each in found if (each.one, each.other) not in touched]
-        yield from self._grouped([*touching, *found], self._obstacles)
+        yield from self._grouped(self._to_obstacles.near(self._data, within_m), self._obstacles)
 
     def near_regions(self, within_m: float) -> Iterator[Near]:
         """Yield where moving links are so near to regions: each link and region once."""
@@ -162,28 +158,7 @@ class MujocoEngine:
         mujoco.mj_jac(self._model, data, jacobian[:3], jacobian[3:], point, link)
         return jacobian
 
-    def _contacts(self) -> list[Closest]:
-        """Return where the arm touches obstacles, as MuJoCo's contacts have it."""
-        contacts = self._data.contact
-        found = []
-        for (first, second), distance, point, frame in zip(
-            contacts.geom.tolist(),
-            contacts.dist.tolist(),
-            contacts.pos,
-            contacts.frame,
-            strict=True,
-        ):
-            # MuJoCo's normal points from the first to the second.
-            one, other, normal = (
-                (second, first, frame[:3])
-                if first in self._obstacles
-                else (first, second, -frame[:3])
-            )
-            half = 0.5 * distance * normal
-            found.append(Closest(one, other, distance, point + half, point - half, normal))
-        return found
-
-    def _grouped(self, found: list[Closest], names: dict[int, str]) -> Iterator[Near]:
+    def _grouped(self, found: Iterable[Closest], names: dict[int, str]) -> Iterator[Near]:
         """Yield what is near, each link and name once."""
 
         def key(each: Closest) -> tuple[str, int]:

@@ -168,13 +168,9 @@ def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujo
                 joint.remove(mimic)
     text = ElementTree.tostring(robot, encoding="unicode")
     try:
-        spec = mujoco.MjSpec.from_string(text, assets=meshes)
+        return mujoco.MjSpec.from_string(text, assets=meshes)
     except ValueError as error:
         raise UserError(f"{urdf}: MuJoCo cannot read it: {error}") from error
-    for each in spec.meshes:
-        # Masses are the URDF's: a mesh that is open or inside out has a hull all the same.
-        each.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-    return spec
 
 
 def _is_text_stl(file: Path) -> bool:

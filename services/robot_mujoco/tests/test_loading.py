@@ -90,6 +90,9 @@ def test_a_mesh_is_near_a_link_where_a_triangle_of_it_is(tmp_path: Path) -> None
     base = names["base"]
     # The base is a cylinder of 0.1 m about z; the triangle's long edge passes through that.
     assert engine.links_touching([base], mesh, 0.002) == {base}
+    # In the corner of the box about the triangle, which is half empty.
+    beside = mesh.model_copy(update={"position_m": (-1.0, -0.1, 0.0)})
+    assert engine.links_touching([base], beside, 0.002) == frozenset()
     away = mesh.model_copy(update={"position_m": (0.0707 + 0.105, 0.0707 + 0.105, 0.0)})
     assert engine.links_touching([base], away, 0.002) == frozenset()
     assert engine.links_touching([base], away, 0.2) == {base}
@@ -104,12 +107,18 @@ PENDULUM = """<robot name="pendulum"><link name="base"/>
 <limit lower="-3" upper="3" velocity="2" effort="50"/></joint></robot>"""
 
 
-@pytest.mark.parametrize("written", ["stl", "stl_ascii", "obj", "ply"])
+@pytest.mark.parametrize("written", ["stl", "stl_ascii", "obj", "ply", "inside_out"])
 def test_a_link_is_where_its_mesh_is_whatever_kind_of_file_that_is(
     tmp_path: Path, written: str
 ) -> None:
+    bob = trimesh.creation.box((1.0, 1.0, 2.0))
+    if written == "inside_out":
+        bob.invert()
+        # Open, too.
+        bob.update_faces(np.arange(len(bob.faces)) > 1)
+        written = "stl"
     suffix = written.removesuffix("_ascii")
-    trimesh.creation.box((1.0, 1.0, 2.0)).export(tmp_path / f"bob.{suffix}", file_type=written)
+    bob.export(tmp_path / f"bob.{suffix}", file_type=written)
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(PENDULUM.replace("SUFFIX", suffix), encoding="utf-8")
     ball = Obstacle(name="ball", shape="sphere", position_m=(0.3, 0.0, 0.5), radius_m=0.05)
