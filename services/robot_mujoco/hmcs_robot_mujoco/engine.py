@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Iterable, Iterator
 from itertools import combinations, groupby, product
-from typing import Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from hmcs.arrays import Array
-from hmcs.errors import UserError
 from hmcs.fixtures.regions.closest import cross
 from hmcs.task import ForbiddenRegion
 from hmcs_robot.driver import Pose
@@ -21,6 +19,9 @@ from hmcs_robot_mujoco.distances import Closest, OwnPairs, Pairs
 from hmcs_robot_mujoco.loading import loaded
 from hmcs_robot_mujoco.motors import torques_for
 from hmcs_robot_mujoco.triangles import Probe
+
+if TYPE_CHECKING:
+    from hmcs_robot_mujoco.window import Window
 
 
 class MujocoEngine:
@@ -131,7 +132,7 @@ class MujocoEngine:
         mujoco.mj_step2(self._model, self._data)
         mujoco.mj_step1(self._model, self._data)
         if self._window is not None:
-            self._window.sync()
+            self._window.show()
 
     def close(self) -> None:
         """End the simulation."""
@@ -202,16 +203,8 @@ def _joints_below(model: mujoco.MjModel) -> list[int]:
     return below
 
 
-def _window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
-    """Return a window that shows the cell; raises UserError where none opens."""
+def _window(model: mujoco.MjModel, data: mujoco.MjData) -> Window:
     # Imported here: it looks for a display, and a robot rarely has a window.
-    import glfw
-    from mujoco import viewer
+    from hmcs_robot_mujoco.window import Window
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        # MuJoCo's viewer would end the process.
-        there = glfw.init()
-    if not there:
-        raise UserError("no window could be opened: is there a display? Run without gui")
-    return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+    return Window(model, data)

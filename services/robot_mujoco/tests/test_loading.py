@@ -129,3 +129,10 @@ def test_a_link_is_where_its_mesh_is_whatever_kind_of_file_that_is(
     assert near.distances_m == pytest.approx([0.2], abs=1e-6)
     np.testing.assert_allclose(near.on_arm, [[0.05, 0.0, 0.5]], atol=1e-3)
     np.testing.assert_allclose(near.normals, [[-1.0, 0.0, 0.0]], atol=1e-3)
+
+
+def test_without_a_display_a_window_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(UserError, match="Run without gui"):
+        MujocoEngine(Cell(ROBOTS["puma560"], (), ()), PERIOD_S, gui=True)
