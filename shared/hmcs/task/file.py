@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
@@ -126,8 +127,12 @@ def _with_files_beside(task: Task, file: Path) -> Task:
 
 
 def _beside(file: Path, index: int, named: str) -> str:
+    path = file.parent / named
     try:
-        return str((file.parent / named).resolve())
+        # From Python 3.13 on, to resolve a circle of links is no error.
+        with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+            path.stat()
+        return str(path.resolve())
     except (OSError, RuntimeError, ValueError) as error:
         # A null byte, or links that lead in a circle.
         location = ("workspace", "forbidden", index, "file")
