@@ -9,7 +9,8 @@ from hmcs.errors import UserError
 from hmcs.task import check_task, load_task
 from hmcs_local.new_task import PLACES, PLANES, STATES, task_name_of, write_new_task
 from hmcs_robot.driver import Pose
-from hmcs_robot.simulation import start_posture
+from hmcs_robot.simulation import Scene, Simulation
+from support.arms import arm
 
 
 @pytest.mark.parametrize("plane", [None, *PLANES])
@@ -26,14 +27,17 @@ def test_what_is_written_is_a_task_as_asked_for(tmp_path: Path, robot: str, plan
     assert dict(task.start) == {"approach": 1.0}
 
 
-@pytest.mark.parametrize("robot", PLACES)
+@pytest.mark.parametrize("robot", map(arm, PLACES))
 def test_the_arm_reaches_where_a_new_task_begins(tmp_path: Path, robot: str) -> None:
     file = tmp_path / "pick.yaml"
     write_new_task(file, STATES, robot, None)
     task = load_task(file)
     start = task.robot.tool_start_m
     assert not task.workspace.excess_m(start)
-    start_posture(robot, Pose(np.array(start), np.array(task.robot.tool_orientation_xyzw)))
+    begin = Pose(np.array(start), np.array(task.robot.tool_orientation_xyzw))
+    simulation = Simulation(Scene(robot, begin, ()), 1 / 240)
+    np.testing.assert_allclose(simulation.read().tool.position, start, atol=1e-3)
+    simulation.close()
 
 
 def test_a_file_that_is_there_is_kept_unless_it_is_to_be_replaced(tmp_path: Path) -> None:

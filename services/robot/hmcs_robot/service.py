@@ -37,7 +37,7 @@ from hmcs_robot.channel import (
     writer_id,
 )
 from hmcs_robot.control_room import ControlRoom, ControlRoomError
-from hmcs_robot.robots import ROBOTS
+from hmcs_robot.robots import robot_named
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.supervision import Order
 
@@ -89,7 +89,7 @@ class Robot(Service):
                 "links that reach into a forbidden region at the start are not kept out of it",
                 extra={"links": ", ".join(self._room.links_within)},
             )
-        missing = missing_meshes(ROBOTS[self._task.robot.model].urdf)
+        missing = missing_meshes(robot_named(self._task.robot.model).urdf)
         if missing:
             self.log.warning(
                 "meshes that the URDF names and nobody can draw: there is no such file",
@@ -259,5 +259,7 @@ class Robot(Service):
         )
 
     def _robot_description(self, _: Ask) -> RobotDescription:
-        robot_description = arm_description(ROBOTS[self._task.robot.model].urdf, self._joint_names)
+        robot_description = arm_description(
+            robot_named(self._task.robot.model).urdf, self._joint_names
+        )
         return RobotDescription(robot=self._task.robot.model, **robot_description._asdict())

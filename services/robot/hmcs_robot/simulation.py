@@ -14,7 +14,7 @@ from hmcs_robot.arm_description import ArmDescription, arm_description
 from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
 from hmcs_robot.kinematics import inverse_kinematics
-from hmcs_robot.robots import ROBOTS
+from hmcs_robot.robots import robot_named
 
 _TOUCHING_M = 0.0005
 """Nearer than this counts as contact: the solver keeps bodies about so far apart."""
@@ -37,7 +37,7 @@ class Scene(NamedTuple):
     """What is simulated."""
 
     robot: str
-    """A name of `ROBOTS`."""
+    """As in a task file."""
     start: Pose
     """Of the tool."""
     obstacles: tuple[Obstacle, ...]
@@ -66,7 +66,7 @@ class Simulation:
     ) -> None:
         self.name = scene.robot
         self._reach_m = reach_m
-        model = ROBOTS[scene.robot]
+        model = robot_named(scene.robot)
         self.engine_name, opens = engine_named(engine)
         self.engine = opens(Cell(model, scene.obstacles, scene.forbidden), period_s, gui=gui)
         try:
@@ -105,7 +105,7 @@ class Simulation:
 
     def robot_description(self) -> ArmDescription:
         """Return what is needed to draw the arm."""
-        return arm_description(ROBOTS[self.name].urdf, self.joint_names)
+        return arm_description(robot_named(self.name).urdf, self.joint_names)
 
     def close(self) -> None:
         """End the simulation."""

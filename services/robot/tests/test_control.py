@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hmcs_robot.control import Following, Standing, Tuning, _Inverse, stand
+from support.arms import arm, needs
 
 SPEED_TOLERANCE = 1.02
 WALL_TOLERANCE_M = 1e-4
@@ -46,7 +47,7 @@ def test_no_finite_command_leads_beyond_a_limit(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("robot", ["puma560", "iiwa", "panda"])
+@pytest.mark.parametrize("robot", [arm("puma560"), arm("iiwa"), arm("panda")])
 def test_the_ends_of_the_joints_ranges_hold_and_let_the_arm_come_back(
     bench: Any, robot: str
 ) -> None:
@@ -126,7 +127,7 @@ def test_a_joint_speed_limit_slows_the_whole_motion_without_turning_it(bench: An
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("robot", ["puma560", "iiwa", "panda"])
+@pytest.mark.parametrize("robot", [arm("puma560"), arm("iiwa"), arm("panda")])
 def test_the_tool_tracks_200_mm_per_s_within_3_mm_per_s_and_without_drift(
     bench: Any, robot: str, period_s: float
 ) -> None:
@@ -146,6 +147,7 @@ def test_the_tool_tracks_200_mm_per_s_within_3_mm_per_s_and_without_drift(
     assert abs(abs(end.orientation @ begun.orientation) - 1) < 1e-6
 
 
+@needs("iiwa")
 @pytest.mark.long
 def test_a_redundant_arm_returns_to_its_posture_when_its_tool_returns(bench: Any) -> None:
     rig = bench("iiwa")
@@ -216,8 +218,8 @@ def test_near_a_singularity_the_tool_slows_down_and_comes_out_again(bench: Any) 
 @pytest.mark.parametrize(
     ("robot", "plan"),
     [
-        ("iiwa", [(8.0, [0.2, 0, 0, 0, 0, 0])]),
-        ("panda", [(3.0, [0.2, 0, 0, 0, 0, 0]), (5.0, [0, 0, 0.1, 0, 0, 0])]),
+        arm("iiwa", [(8.0, [0.2, 0, 0, 0, 0, 0])]),
+        arm("panda", [(3.0, [0.2, 0, 0, 0, 0, 0]), (5.0, [0, 0, 0.1, 0, 0, 0])]),
         ("puma560", [(6.0, [0.2, 0, 0.05, 0, 0, 0])]),
     ],
 )

@@ -14,6 +14,7 @@ from hmcs_robot.engine import Cell
 from hmcs_robot.robots import ROBOTS, RobotModel
 from hmcs_robot_mujoco.engine import MujocoEngine
 from hmcs_robot_mujoco.loading import loaded
+from support.arms import needs
 
 PERIOD_S = 1 / 240
 
@@ -35,6 +36,7 @@ def test_an_arm_stands_still_under_gravity_and_follows_velocities(robot: str) ->
     engine.close()
 
 
+@needs("panda")
 def test_a_joint_that_is_no_part_of_the_way_to_the_tool_is_held() -> None:
     found = loaded(Cell(ROBOTS["panda"], (), ()), PERIOD_S)
     assert found.joint_names == tuple(f"panda_joint{k}" for k in range(1, 8))
@@ -53,6 +55,7 @@ def test_weak_motors_let_the_arm_sink(tmp_path: Path) -> None:
     assert engine.tool().position[2] < height - 0.05
 
 
+@needs("iiwa")
 @pytest.mark.parametrize(
     ("before", "after", "expected"),
     [
