@@ -12,48 +12,38 @@ know goes into the setting `options`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from hmcs.arrays import Array
 from hmcs.bus.messages import Handle
 from hmcs.errors import UserError
+from hmcs.motion.device_sample import FARTHEST_M, FASTEST_M_S, LIVE, DeviceSample
 from hmcs.task import Task
 from hmcs_input_device.settings import InputDeviceSettings
 
+__all__ = [
+    "FARTHEST_M",
+    "FASTEST_M_S",
+    "LIVE",
+    "DeviceSample",
+    "HearsHandle",
+    "Plays",
+    "SeesRobot",
+    "Source",
+    "SourceFactory",
+    "Troubled",
+    "at_rest",
+    "open_source",
+    "plays",
+    "released",
+]
+
 ENTRY_POINTS = "hmcs.input_sources"
 """Group of the entry points that name sources."""
-LIVE = math.inf
-"""Duration of a source that has no end."""
-FARTHEST_M = 1e4
-"""No hand is farther from its zero, along any axis."""
-FASTEST_M_S = 5.0
-"""No hand moves faster."""
-
-
-class DeviceSample(NamedTuple):
-    """The operator's device at one moment; positions in the operator frame, see `Motion`."""
-
-    position: Array
-    """m, shape (3,)."""
-    velocity: Array
-    """m/s, shape (3,)."""
-    dead_man: bool
-    clutch: bool = False
-    pedal: bool = False
-    orientation: Array | None = None
-    """x y z w, shape (4,)."""
-    angular_velocity: Array | None = None
-    """rad/s, shape (3,)."""
-    wrench: Array | None = None
-    """N and N·m, shape (6,)."""
-    age_s: float | None = None
-    """How long ago the device reported this; None where the source cannot know. A device whose
-    reports stay out is no longer believed."""
 
 
 def released(sample: DeviceSample) -> DeviceSample:

@@ -16,7 +16,7 @@ import msgpack
 import numpy as np
 
 from hmcs.arrays import Array
-from hmcs_robot.supervision import Order, Stop
+from hmcs.supervision import Order, Stop
 
 LARGEST_BYTES = 65_536
 """Of a datagram: a snapshot with hundreds of contacts is smaller."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.arrays import Array
+from hmcs.arrays import Array, shortened
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.motion import quaternions
@@ -23,7 +23,6 @@ from hmcs_robot.driver import ArmState, Pose
 from hmcs_robot.limits import (
     Limits,
     bounds_of,
-    shortened,
     speed_scale,
     within_acceleration,
     within_planes,

@@ -11,12 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs_robot.channel import Numbered, Request, SignOfLife, Snapshot, StopAsked
-from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow, stand
-from hmcs_robot.driver import ArmDriver
-from hmcs_robot.fence import Fence
-from hmcs_robot.limits import Limits
-from hmcs_robot.supervision import (
+from hmcs.supervision import (
     AT_ONCE,
     Policy,
     Supervision,
@@ -26,6 +21,11 @@ from hmcs_robot.supervision import (
     tick,
     unpaired,
 )
+from hmcs_robot.channel import Numbered, Request, SignOfLife, Snapshot, StopAsked
+from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow, stand
+from hmcs_robot.driver import ArmDriver
+from hmcs_robot.fence import Fence
+from hmcs_robot.limits import Limits
 
 STILL_M_S = 1e-4
 """A reference slower than this, m/s and rad/s, has come to a stand."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.arrays import Array
+from hmcs.arrays import Array, shortened
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.fixtures.regions.keep_out import KeepOut
@@ -86,19 +86,6 @@ def _room(position: Array, limits: Limits, margin_m: float) -> Array:
     """Return the distance to the lower and the upper walls, m, shape (2, 3), never negative."""
     room = np.stack([position - limits.workspace_lower_m, limits.workspace_upper_m - position])
     return np.maximum(room - margin_m, 0.0)
-
-
-def shortened(vector: Array, length: float) -> Array:
-    """Return `vector` cut to `length` at most, in its direction, however large it is."""
-    largest = float(np.abs(vector).max())
-    if largest == 0.0:
-        return vector
-    shape = vector / largest
-    norm = float(np.linalg.norm(shape))
-    if largest <= length / norm:
-        return vector
-    cut: Array = shape * (length / norm)
-    return cut
 
 
 class Bounds(NamedTuple):

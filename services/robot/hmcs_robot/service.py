@@ -25,6 +25,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import LOOKS, STOP
+from hmcs.supervision import Order
 from hmcs.task import load_task
 from hmcs_robot.arm_description import arm_description, missing_meshes
 from hmcs_robot.channel import (
@@ -39,7 +40,6 @@ from hmcs_robot.channel import (
 from hmcs_robot.control_room import ControlRoom, ControlRoomError
 from hmcs_robot.robots import robot_named
 from hmcs_robot.settings import RobotSettings
-from hmcs_robot.supervision import Order
 
 SIGN_EVERY_S = 0.02
 """How often the control room gets a sign of life."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmcs.supervision import Policy
 from hmcs.task import Task
 from hmcs_robot.control import Tuning
 from hmcs_robot.driver import ArmDriver, Pose
 from hmcs_robot.limits import Limits
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation
-from hmcs_robot.supervision import Policy
 
 
 def tuning_of(settings: RobotSettings) -> Tuning:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from hmcs.arrays import Array
 from hmcs.fixtures.regions.forbidden import Plane, Region, sphere
 from hmcs.fixtures.regions.tool_shape import ToolShape
+from hmcs.supervision import Order, Policy
 from hmcs_robot.arm_description import ArmDescription
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired
 from hmcs_robot.control import Tuning
@@ -20,7 +21,6 @@ from hmcs_robot.control_loop import ControlLoop, Rules
 from hmcs_robot.driver import ArmState, JointLimits, Pose
 from hmcs_robot.fence import Fence
 from hmcs_robot.limits import Limits
-from hmcs_robot.supervision import Order, Policy
 
 PERIOD_NS = 4_000_000
 MS = 1_000_000

@@ -216,6 +216,11 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
             ),
             watches=(any_presence, keys.member(ANY)),
         ),
+        "ros2_bridge": service(
+            "ros2_bridge",
+            hears=(keys.motion, keys.robot_state, keys.fixture_state, beliefs),
+            watches=(any_presence,),
+        ),
         OPERATOR: Rights(
             says=(keys.label, keys.stop_request),
             hears=everything_seen,

@@ -164,6 +164,11 @@ def stopped(now: Supervision) -> Supervision:
     return replace(_halt(now, "asked"), asked_until_ns=(now.ticked_ns or 0) + ASKED_TOLD_NS)
 
 
+def silent(now: Supervision) -> Supervision:
+    """Return the supervision while the arm itself is not heard, so that nothing may move it."""
+    return _halt(now, "late_tick")
+
+
 def unpaired(now: Supervision, writer: Writer) -> Supervision:
     """Return the supervision after a writer was heard to drive another robot."""
     return _halt(now, "not_paired") if now.writer == writer else now

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs_robot.supervision import (
+from hmcs.supervision import (
     Order,
     Policy,
     Supervision,

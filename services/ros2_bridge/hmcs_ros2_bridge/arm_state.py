@@ -1,0 +1,125 @@
+"""What a ROS robot says of itself, kept as the newest of each kind."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hmcs.arrays import Array
+from hmcs.motion.quaternions import between
+from hmcs_ros2_bridge.fields import NonsenseError, check_frame, pose_in
+
+MOST_JOINTS = 64
+LONGEST_URDF = 1_000_000
+"""Letters of a description that are kept."""
+_LONGEST_GAP_S = 0.5
+"""A velocity over a longer time says nothing of now."""
+
+
+class ArmReport(NamedTuple):
+    """The tool at one moment, base frame."""
+
+    position: Array
+    """m, shape (3,)."""
+    orientation: Array
+    """x y z w, shape (4,)."""
+    twist: Array
+    """m/s and rad/s, shape (6,), over the time since the report before, by the arm's own clock."""
+    stamp_s: float
+    """By the arm's own clock."""
+    heard_ns: int
+    """Arrival by this process' monotonic clock."""
+
+
+class Joints(NamedTuple):
+    """The joints at one moment."""
+
+    names: tuple[str, ...]
+    positions: Array
+    """rad, or m of prismatic joints, shape (n,)."""
+    velocities: Array
+    """The same per second; zero where the robot does not say."""
+
+
+def joints_in(message: Any) -> Joints:
+    """Return a sensor_msgs/JointState; raises NonsenseError for one that does not fit itself."""
+    names = tuple(message.name)
+    positions = np.array(message.position, dtype=float)
+    velocities = np.array(message.velocity, dtype=float)
+    if not len(velocities):
+        velocities = np.zeros(len(positions))
+    if not len(names) == len(positions) == len(velocities) <= MOST_JOINTS:
+        raise NonsenseError(
+            f"tells {len(names)} joints, {len(positions)} positions, {len(velocities)} velocities"
+        )
+    if not (np.isfinite(positions).all() and np.isfinite(velocities).all()):
+        raise NonsenseError("tells joints that are not finite")
+    return Joints(names, positions, velocities)
+
+
+def report_of(message: Any, heard_ns: int, before: ArmReport | None, frame: str) -> ArmReport:
+    """Return a geometry_msgs/PoseStamped of the tool as a report after another one.
+
+    Raises NonsenseError where it is in another frame, or cannot be.
+    """
+    check_frame(message, (frame,))
+    position, orientation = pose_in(message.pose)
+    stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+    moving = np.zeros(6)
+    if before is not None and 0.0 < stamp_s - before.stamp_s <= _LONGEST_GAP_S:
+        turn = between(before.orientation, orientation)
+        moved = np.concatenate([position - before.position, turn])
+        moving = moved / (stamp_s - before.stamp_s)
+    return ArmReport(position, orientation, moving, stamp_s, heard_ns)
+
+
+class ArmReports:
+    """The newest reports of an arm; taken on ROS' thread, read in the loop."""
+
+    def __init__(self, frame: str) -> None:
+        self._frame = frame
+        self._waiting = False
+        self.newest: ArmReport | None = None
+        """Of the tool."""
+        self.joints = Joints((), np.zeros(0), np.zeros(0))
+        self.urdf = ""
+        self.refused = 0
+        """Reports that could not be used."""
+        self.refusal = ""
+        """Why the last one could not; empty after one that could."""
+
+    def take_pose(self, message: Any, heard_ns: int) -> bool:
+        """Take in a report of the tool; return whether it is to be handled, see `handled`."""
+        try:
+            self.newest = report_of(message, heard_ns, self.newest, self._frame)
+        except NonsenseError as error:
+            self._refuse(f"the tool's pose {error}")
+            return False
+        self.refusal = ""
+        waiting, self._waiting = self._waiting, True
+        return not waiting
+
+    def handled(self) -> None:
+        """Note that the newest report was handled."""
+        self._waiting = False
+
+    def take_joints(self, message: Any) -> None:
+        """Take in the joints."""
+        try:
+            self.joints = joints_in(message)
+        except NonsenseError as error:
+            self._refuse(f"the robot {error}")
+
+    def take_description(self, message: Any) -> None:
+        """Take in how the robot looks."""
+        if len(message.data) <= LONGEST_URDF:
+            self.urdf = message.data
+
+    def age_s(self, now_ns: int) -> float | None:
+        """Return how long ago the tool was heard of; None where it never was."""
+        return None if self.newest is None else (now_ns - self.newest.heard_ns) / 1e9
+
+    def _refuse(self, reason: str) -> None:
+        self.refused += 1
+        self.refusal = reason

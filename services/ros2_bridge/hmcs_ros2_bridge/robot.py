@@ -1,0 +1,315 @@
+"""`python -m hmcs_ros2_bridge.robot`: a robot of the cell whose arm a ROS 2 controller moves.
+
+On the bus it is a robot as any other, with the same rights and the same supervision; towards ROS it
+publishes a TwistStamped. It stops where its commands go stale, where the arm is silent, where
+another node publishes on its topic, and after a hang of its own; then only a deliberate re-engage
+of the operator moves it again. The arm's controller has to stop by itself where commands stay out:
+that is what holds where this process dies.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import OrderedDict
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hmcs.bus.logs import RateLimitedLog
+from hmcs.bus.messages import (
+    Ask,
+    Command,
+    Done,
+    Origin,
+    Pairing,
+    RobotDescription,
+    RobotState,
+    StopRequest,
+)
+from hmcs.bus.service import Service, run
+from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.verbs import LOOKS, STOP
+from hmcs.supervision import (
+    Order,
+    Policy,
+    Supervision,
+    accept,
+    heard,
+    silent,
+    stopped,
+    tick,
+    unpaired,
+)
+from hmcs.task import load_task
+from hmcs_ros2_bridge.arm_state import ArmReports
+from hmcs_ros2_bridge.fields import header, twist
+from hmcs_ros2_bridge.robot_settings import RosRobotSettings
+from hmcs_ros2_bridge.ros import Node, Topic
+from hmcs_ros2_bridge.tool_limits import Limited, tool_limits_of
+
+PAIRING_FRESH_S = 1.0
+"""A pairing not heard again for so long binds nobody any more."""
+PAIRINGS_KEPT = 16
+"""Fixture controllers whose pairing is remembered."""
+OTHERS_EVERY_S = 0.5
+"""How often other publishers on the command's topic are looked for."""
+_NS_PER_S = 1_000_000_000
+_STANDS = Limited(np.zeros(6), ())
+
+
+class RosRobot(Service):
+    """Follows the commands of one writer at a time, by way of a ROS 2 controller."""
+
+    name = "robot"
+    Settings = RosRobotSettings
+    settings: RosRobotSettings
+
+    def __init__(self, settings: RosRobotSettings, bus: Bus, log: logging.Logger) -> None:
+        super().__init__(settings, bus, log)
+        self._task = load_task(settings.task)
+        self._limits = tool_limits_of(
+            self._task,
+            settings.delay_s,
+            settings.acceleration_limit_m_s2,
+            settings.angular_acceleration_limit_rad_s2,
+        )
+        self._policy = Policy(
+            longest_valid_ns=round(settings.command_valid_for_ms * 1e6),
+            late_tick_ns=round(settings.hang_s * 1e9),
+            hang_ns=round(settings.hang_s * 1e9),
+            settle_ns=round(settings.settle_s * 1e9),
+        )
+        self._limited_log = RateLimitedLog(log)
+        self._supervision = Supervision()
+        self._admitted = _STANDS
+        self._admitted_ns = time.monotonic_ns()
+        self._origin: Origin | None = None
+        self._command_ns: int | None = None
+        self._pairings: OrderedDict[str, tuple[str, int]] = OrderedDict()
+        self._trouble = "nothing was heard of the arm yet"
+        self._others = 0
+        self._told_stop = ""
+        self._states = bus.publisher(RobotState, bus.keys.robot_state)
+        self._node = Node(settings.node, settings.ros_args)
+        self._arm = ArmReports(settings.base_frame)
+        self._commands = self._node.publisher(
+            Topic(settings.command_topic, "geometry_msgs/TwistStamped", "reliable")
+        )
+
+    def start(self) -> None:
+        """Listen on both sides."""
+        bus, settings, node, arm = self.bus, self.settings, self._node, self._arm
+        LOOKS.answer(bus, self._looks)
+        STOP.answer(bus, self._on_stop)
+        bus.subscribe(Command, bus.keys.command, self._on_command)
+        bus.subscribe(StopRequest, bus.keys.stop_request, self._on_stop_request)
+        bus.subscribe(Pairing, bus.keys.pairing, self._on_pairing)
+        pose = Topic(settings.tool_pose_topic, "geometry_msgs/PoseStamped", "sensor")
+        node.subscribe(pose, self._on_pose)
+        joints = Topic(settings.joint_states_topic, "sensor_msgs/JointState", "sensor")
+        node.subscribe(joints, arm.take_joints)
+        description = Topic(settings.robot_description_topic, "std_msgs/String", "latched")
+        node.subscribe(description, arm.take_description)
+        node.start()
+        bus.every(1.0 / settings.command_rate_hz, self._on_tick)
+        bus.every(OTHERS_EVERY_S, self._look_for_others)
+
+    def health(self) -> tuple[bool, str]:
+        """Return whether the arm is heard, and whether it follows or why it stands."""
+        if self._trouble:
+            return False, f"standing: {self._trouble}"
+        if self._supervision.stop == "none":
+            return True, "following commands"
+        return True, f"standing: {self._supervision.stop}"
+
+    def facts(self) -> dict[str, str]:
+        """Return which robot this is."""
+        return {
+            "robot": self._task.robot.model,
+            "task": self._task.name,
+            "commands": self.settings.command_topic,
+            "refused_reports": str(self._arm.refused),
+            "braking_per_s": f"{self._limits.braking_per_s:.2f}",
+        }
+
+    def close(self) -> None:
+        """Bring the arm to a stand and leave ROS."""
+        self._send(_STANDS)
+        self._node.close()
+
+    # --- commands ---------------------------------------------------------------------------------
+
+    def _on_command(self, received: Received[Command]) -> None:
+        command, source = received.body, received.envelope.source
+        if other := self._paired_with_another(source.boot, received.received_ns):
+            self._refuse(f"{source.service}/{source.instance} drives another robot: {other}")
+            self._supervision = unpaired(self._supervision, source.boot)
+            return
+        now_ns = time.monotonic_ns()
+        order = Order(
+            writer=source.boot,
+            twist=command.twist,
+            valid_for_ns=command.valid_for_ns,
+            engaged=command.engaged,
+            received_ns=received.received_ns,
+        )
+        self._supervision, verdict = accept(self._supervision, order, now_ns, self._policy)
+        if verdict == "late":
+            self.bus.counters.late[Command.SCHEMA] += 1
+        elif verdict == "second_writer":
+            self._refuse("a second writer, while the first one is fresh")
+        else:
+            self._origin, self._command_ns = received.envelope.origin, received.received_ns
+            self._supervise(now_ns)
+            self._move(now_ns)
+
+    def _on_pairing(self, received: Received[Pairing]) -> None:
+        writer = received.envelope.source.boot
+        self._pairings[writer] = (received.body.robot, received.received_ns)
+        self._pairings.move_to_end(writer)
+        if len(self._pairings) > PAIRINGS_KEPT:
+            self._pairings.popitem(last=False)
+
+    def _paired_with_another(self, writer: str, now_ns: int) -> str:
+        """Return the boot of another robot that this writer drives; empty where it is this one."""
+        robot, said_ns = self._pairings.get(writer, ("", 0))
+        if robot == self.bus.source.boot or now_ns - said_ns > PAIRING_FRESH_S * _NS_PER_S:
+            return ""
+        return robot
+
+    def _on_stop(self, _: Ask) -> Done:
+        self._stop()
+        return Done(detail="stands until the operator lets go and takes hold again")
+
+    def _on_stop_request(self, received: Received[StopRequest]) -> None:
+        source = received.envelope.source
+        self.log.warning("asked to stand", extra={"by": f"{source.service}/{source.instance}"})
+        self._stop()
+
+    def _stop(self) -> None:
+        self._supervision = stopped(self._supervision)
+        self._move(time.monotonic_ns())
+
+    def _refuse(self, reason: str) -> None:
+        self.bus.counters.refused[Command.SCHEMA] += 1
+        self._limited_log.warning("refused", "command refused", reason=reason)
+
+    # --- control ----------------------------------------------------------------------------------
+
+    def _on_tick(self) -> None:
+        now_ns = time.monotonic_ns()
+        self._supervision = heard(self._supervision, now_ns, self._policy)
+        self._supervision = tick(self._supervision, (), now_ns, self._policy)
+        self._supervise(now_ns)
+        self._move(now_ns)
+        if self._trouble:
+            self._publish_state()
+
+    def _supervise(self, now_ns: int) -> None:
+        """Stop an arm that is not heard, or that somebody else moves."""
+        before, self._trouble = self._trouble, self._trouble_at(now_ns)
+        if self._trouble:
+            stop = silent(self._supervision)
+            self._supervision = replace(stop, stop="second_writer") if self._others > 0 else stop
+        if self._trouble != before and self._trouble:
+            self._limited_log.warning("arm", "the robot is stopped", reason=self._trouble)
+
+    def _trouble_at(self, now_ns: int) -> str:
+        if self._others > 0:
+            return (
+                f"{self._others} other publishers on {self.settings.command_topic}: end them, one "
+                "alone may move the arm"
+            )
+        age_s = self._arm.age_s(now_ns)
+        if age_s is None or age_s * 1000.0 > self.settings.silent_after_ms:
+            said = self._arm.refusal or "the robot is silent"
+            return f"{said}: expected a PoseStamped on {self.settings.tool_pose_topic}"
+        return ""
+
+    def _look_for_others(self) -> None:
+        self._others = self._commands.others()
+
+    def _move(self, now_ns: int) -> None:
+        elapsed_s = min((now_ns - self._admitted_ns) / _NS_PER_S, 0.1)
+        before, arm = self._admitted.twist, self._arm.newest
+        if self._supervision.stop == "none" and arm is not None:
+            limited = self._limits.admitted(
+                self._supervision.twist, arm.position, arm.orientation, before, elapsed_s
+            )
+        else:
+            limited = _STANDS
+        self._admitted, self._admitted_ns = limited, now_ns
+        self._send(limited)
+        if self._supervision.stop != self._told_stop:
+            self._told_stop = self._supervision.stop
+            following = self._told_stop == "none"
+            self.log.info(
+                "following" if following else "standing",
+                extra={} if following else {"reason": self._told_stop},
+            )
+
+    def _send(self, limited: Limited) -> None:
+        self._commands.put(
+            {
+                "header": header(self._node.now_ns(), self.settings.base_frame),
+                "twist": twist(limited.twist),
+            }
+        )
+
+    # --- what the arm says ------------------------------------------------------------------------
+
+    def _on_pose(self, message: Any) -> None:
+        # On the thread of the node. The newest alone waits for its turn in the loop.
+        if self._arm.take_pose(message, time.monotonic_ns()):
+            self.bus.soon(self._on_report)
+
+    def _on_report(self) -> None:
+        self._arm.handled()
+        self._publish_state()
+
+    def _publish_state(self) -> None:
+        arm = self._arm.newest
+        if arm is None:
+            return
+        following = self._supervision.stop == "none"
+        age_ns = None if self._command_ns is None else time.monotonic_ns() - self._command_ns
+        joints = self._arm.joints
+        self._states.put(
+            RobotState(
+                robot=self._task.robot.model,
+                joint_names=joints.names,
+                joint_positions=joints.positions,
+                joint_velocities=joints.velocities,
+                tool_position=arm.position,
+                tool_orientation=arm.orientation,
+                tool_twist=arm.twist,
+                reference_twist=self._admitted.twist,
+                nearest_obstacle="",
+                nearest_distance_m=None,
+                contacts=(),
+                stop=self._supervision.stop,
+                limited=self._admitted.names,
+                region_distance_m=self._limits.clearance_m(arm.position, arm.orientation),
+                command_age_s=None if age_ns is None else max(age_ns / _NS_PER_S, 0.0),
+            ),
+            self._origin if following else None,
+        )
+
+    def _looks(self, _: Ask) -> RobotDescription:
+        if not self._arm.urdf:
+            raise RequestRefusedError(
+                f"nothing was heard on {self.settings.robot_description_topic}: start a "
+                "robot_state_publisher"
+            )
+        return RobotDescription(
+            robot=self._task.robot.model,
+            urdf=self._arm.urdf,
+            joints=self._arm.joints.names,
+            files={},
+        )
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(RosRobot))
