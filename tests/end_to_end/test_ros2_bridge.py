@@ -172,7 +172,7 @@ def test_a_ros_operator_drives_once_the_dead_man_was_pressed_and_while_it_is_hea
         _press(stack, operator, motions)
         stack.until(lambda: steps)
         assert motions[-1].velocity == pytest.approx([0.0, 0.1, 0.0])
-        assert steps[-1].direction == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+        assert steps[-1].displacement[1] > 0.005
 
         operator.silent = True
         stack.until(lambda: not motions[-1].dead_man)
@@ -198,7 +198,7 @@ def test_from_a_ros_operator_to_a_ros_robot_through_the_stack(stack: Stack) -> N
         stack.until_ready(
             start_robot(stack),
             stack.start("input_device", "device", "--source", "ros2"),
-            stack.start("fixture_controller", "fixture", "--task", "human-shapes"),
+            stack.start("fixture_controller", "fixture"),
         )
         operator.held = False
         stack.until(lambda: states and motions and states[-1].stop == "disengaged")
@@ -237,9 +237,7 @@ def test_ros_sees_the_cell(stack: Stack, model_file: Path) -> None:
     assert heard["/hmcs/tool_pose"][-1].pose.position.z == pytest.approx(0.3)
     assert json.loads(heard["/hmcs/belief"][-1].data)["states"] == ["one", "two"]
     assert "workspace" in {marker.ns for marker in heard["/hmcs/scene"][-1].markers}
-    stack.until(
-        lambda: any(s.message == "two" for s in heard["/diagnostics"][-1].status)
-    )
+    stack.until(lambda: any(s.message == "two" for s in heard["/diagnostics"][-1].status))
     listener.close()
 
 

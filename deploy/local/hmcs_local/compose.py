@@ -36,6 +36,8 @@ class ServiceSpec:
     command: tuple[str, ...]
     """Empty for the router, whose command is its image's own."""
     environment: Mapping[str, str]
+    optional: bool
+    """True behind a profile: it runs where it is named, and not by default."""
     scale: int
     needs: tuple[str, ...]
     """Services that come before it."""
@@ -156,6 +158,7 @@ def _spec(path: Path, name: str, service: dict[str, Any], awaited: set[str]) -> 
         name=name,
         command=tuple(str(word) for word in command),
         environment={key: str(value) for key, value in environment.items()},
+        optional=bool(service.get("profiles")),
         scale=scale,
         needs=tuple(_needs(service)),
         one_shot=name in awaited,

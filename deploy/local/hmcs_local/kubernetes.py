@@ -52,6 +52,8 @@ def manifests(path: Path) -> list[Manifest]:
     made += [_claim(volume) for volume in sorted(_volumes(stack))]
     made += [_router_service(), _policy()]
     for spec in stack.services.values():
+        if spec.optional:
+            continue
         made.append(_job(spec, raw[spec.name]) if spec.one_shot else _deployment(spec, raw, stack))
     return made
 

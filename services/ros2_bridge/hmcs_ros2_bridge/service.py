@@ -25,7 +25,7 @@ from hmcs_ros2_bridge import scene
 from hmcs_ros2_bridge.fields import Fields
 from hmcs_ros2_bridge.ros import Node, Publisher, Topic
 from hmcs_ros2_bridge.settings import Ros2BridgeSettings
-from hmcs_ros2_bridge.watching import Seen, diagnostics, hand_pose, joint_state, tool_pose
+from hmcs_ros2_bridge.watching import Seen, diagnostics, hand_pose, joint_state, json_of, tool_pose
 
 TOPICS = {
     "belief": Topic("~/belief", "std_msgs/String", "reliable"),
@@ -90,7 +90,7 @@ class Ros2Bridge(Service):
 
     def _told(self, name: str, received: Received[Belief] | Received[FixtureState]) -> None:
         self._note(name, received.received_ns, received.body)
-        self._ros[name].put({"data": received.body.model_dump_json()})
+        self._ros[name].put(json_of(received.body))
 
     def _on_motion(self, received: Received[Motion]) -> None:
         self._note("motion", received.received_ns, received.body)
@@ -105,7 +105,7 @@ class Ros2Bridge(Service):
             stamp_ns, frame = self._node.now_ns(), self.settings.base_frame
             self._ros["tool_pose"].put(tool_pose(state, stamp_ns, frame))
             self._ros["joint_states"].put(joint_state(state, stamp_ns, frame))
-            self._ros["robot_state"].put({"data": state.model_dump_json()})
+            self._ros["robot_state"].put(json_of(state))
 
     def _note(self, name: str, received_ns: int, body: Message) -> None:
         self._newest[name] = (received_ns, body)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import NamedTuple
 
+import numpy as np
+
 from hmcs.bus.messages import Belief, FixtureState, Motion, RobotState
+from hmcs.bus.messages.message import Message
 from hmcs_ros2_bridge.fields import Fields, header, pose
 
 OK, WARN, ERROR, STALE = b"\x00", b"\x01", b"\x02", b"\x03"
@@ -22,6 +26,11 @@ class Seen(NamedTuple):
     fixture: FixtureState | None = None
     belief: Belief | None = None
     motion: Motion | None = None
+
+
+def json_of(message: Message) -> Fields:
+    """Return a std_msgs/String with a message as JSON, its arrays as lists."""
+    return {"data": json.dumps(dict(message), default=np.ndarray.tolist)}
 
 
 def joint_state(state: RobotState, stamp_ns: int, frame: str) -> Fields:
