@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,8 @@ from hmcs.bus.verbs import DESCRIBE
 from support.closed_cells import new_closed_cell
 from support.stack import CELL, Stack
 
-SERVICES = tuple(role for role in roles() if role not in PEOPLE)
+ROS = importlib.util.find_spec("rclpy") is not None
+SERVICES = tuple(role for role in roles() if role not in PEOPLE and (ROS or role != "ros2_bridge"))
 MODEL = "human-shapes"
 
 
@@ -35,6 +37,7 @@ class Closed:
             stack.start("recorder", "recorder", "--folder", folder / "takes", "--models", models),
             stack.start("trainer", "trainer", "serve", "--folder", folder / "models"),
             stack.start("console", "console", "--port", 0, "--models", models),
+            *([stack.start("ros2_bridge", "bridge")] if ROS else []),
             stack.start(
                 "input_device", "device",
                 *("--source", "recorded", "--demonstration", performance, "--repeat", 0),
