@@ -52,7 +52,7 @@ bench: $(READY) ## measure speed and recognition in full, each against its goal;
 	@PYTHONPATH=tests $(RUN)/python -m bench
 
 safety: $(READY) ## measure what keeps the robot safe, a thousand faults among it; some three hours
-	@for what in regions gap tls memory faults "faults --hogs 8"; do \
+	@for what in regions gap tls memory ros2 faults "faults --hogs 8"; do \
 	  PYTHONPATH=tests $(RUN)/python -m safety $$what || failed=1; done; exit $${failed:-0}
 
 peers: $(READY) ## install the libraries that studies compare with, beside the rest

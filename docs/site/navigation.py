@@ -21,6 +21,7 @@ WRITTEN = {
         "docs/how-to/own-fixture",
         "docs/how-to/own-device",
         "docs/how-to/own-robot",
+        "docs/how-to/ros2",
         "docs/how-to/several-hosts",
         "docs/how-to/closed-cell",
     ),

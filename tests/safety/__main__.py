@@ -7,7 +7,7 @@ import argparse
 from rich.progress import Progress
 
 from bench.figures import Figure, tell
-from safety import control_gap, faults, memory, regions, tls_hop
+from safety import control_gap, faults, memory, regions, ros2, tls_hop
 
 
 def main() -> int:
@@ -26,6 +26,8 @@ def main() -> int:
     chosen.add_argument("--span-s", type=float, default=60.0)
     chosen = names.add_parser("memory", help=memory.__doc__)
     chosen.add_argument("--minutes", type=float, default=10.0)
+    chosen = names.add_parser("ros2", help=ros2.__doc__)
+    chosen.add_argument("--minutes", type=float, default=10.0)
     with Progress() as progress:
         figures, title = _measured(parser.parse_args(), progress)
     return 0 if tell(title, figures) else 1
@@ -42,6 +44,8 @@ def _measured(chosen: argparse.Namespace, progress: Progress) -> tuple[list[Figu
             return control_gap.measure(chosen.flood_s, progress), str(control_gap.__doc__)
         case "tls":
             return tls_hop.measure(chosen.span_s, progress), str(tls_hop.__doc__)
+        case "ros2":
+            return ros2.measure(chosen.minutes, progress), str(ros2.__doc__)
         case _:
             return memory.measure(chosen.minutes, progress), str(memory.__doc__)
 

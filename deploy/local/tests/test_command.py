@@ -72,6 +72,18 @@ def test_up_ends_with_0_and_leaves_nothing_behind(
     assert all(is_gone(pid) for pid in pids)
 
 
+@pytest.mark.parametrize(("words", "count"), [((), 2), (("--services", "router,b"), 1)])
+def test_up_starts_a_service_behind_a_profile_only_where_it_is_named(
+    up: Callable[..., Any],
+    write_compose: Callable[..., Path],
+    service: Describe,
+    words: tuple[str, ...],
+    count: int,
+) -> None:
+    write_compose(a=service(scale=2), b=service(profiles=["ros2"]))
+    assert len(up("--router", "tcp/127.0.0.1:0", *words)[1]) == count
+
+
 def test_up_leaves_nothing_behind_when_it_is_killed(
     up: Callable[..., Any],
     write_compose: Callable[..., Path],
