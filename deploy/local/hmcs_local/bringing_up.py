@@ -37,7 +37,7 @@ def arrangement_of(
     time. Raises UserError for what does not go together, and as training and reading a task do.
     """
     _check(wanted)
-    services = tuple(spec.services)
+    services = spec.usual
     models, recordings = (folder.resolve() / name for name in ("models", "recordings"))
     if wanted.task is None:
         source = wanted.source

@@ -59,6 +59,11 @@ class StackSpec:
     variables: frozenset[str]
     """Names of the variables it takes from the environment."""
 
+    @property
+    def usual(self) -> tuple[str, ...]:
+        """Names of the services that run where none are named."""
+        return tuple(name for name, spec in self.services.items() if not spec.optional)
+
     def select(self, names: tuple[str, ...]) -> tuple[ServiceSpec, ...]:
         """Return the named services in starting order; raises ComposeError for an unknown name."""
         for name in names:

@@ -92,8 +92,7 @@ class LocalStack:
         self.folder = folder.resolve()
         self.processes: dict[str, StackProcess] = {}
         """Every service instance started, by instance name; also those that have ended."""
-        usual = (spec.name for spec in self.spec.services.values() if not spec.optional)
-        self._chosen = self.spec.select(tuple(services or usual))
+        self._chosen = self.spec.select(tuple(services or self.spec.usual))
         self._scale = dict(scale or {})
         for name, count in self._scale.items():
             spec = self.spec.service(name)
