@@ -17,18 +17,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hmcs.fixtures.compliance.factor import FREE_FACTOR
+from hmcs.palette import FAINT, GRID_COLOR, INK, STATE_COLORS, UNKNOWN_COLOR, state_color
 from hmcs.recognition.scoring import NONE
 from hmcs_demo.measure import Measured
 from hmcs_demo.summary import Summary
 from hmcs_demo.tracks import Track, recognized
 
-COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
-"""Distinct for all kinds of color vision; states beyond them begin again."""
-UNKNOWN_COLOR = "#8C8C8C"
-INK = "#222222"
-GRID_COLOR = "#e6e6e6"
 SWAP_COLOR = "#000000"
-HOP_COLORS = ("#0072B2", "#009E73", "#CC3311")
+HOP_COLORS = (STATE_COLORS[0], STATE_COLORS[2], STATE_COLORS[3])
 SHOWN_AROUND_SWAP_S = 8.0
 
 _STYLE: dict[Any, Any] = {
@@ -38,7 +34,7 @@ _STYLE: dict[Any, Any] = {
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.labelcolor": INK,
-    "axes.edgecolor": "#888888",
+    "axes.edgecolor": FAINT,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "xtick.color": INK,
@@ -149,7 +145,7 @@ def draw_belief(measured: Measured, summary: Summary, path: Path) -> None:
         belief.set_ylim(0, 1)
         belief.set_ylabel("probability")
         fixture.plot(measured.factor_time_s, measured.factor, color=INK, linewidth=1.2)
-        fixture.axhline(FREE_FACTOR, color="#888888", linewidth=0.8, linestyle=(0, (4, 3)))
+        fixture.axhline(FREE_FACTOR, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)))
         fixture.text(
             1.005, FREE_FACTOR, "free\nmotion", transform=fixture.get_yaxis_transform(), va="center"
         )
@@ -238,7 +234,12 @@ def _around_swap(ax: Axes, measured: Measured, summary: Summary) -> None:
     missing = near & ~answered
     if missing.any():
         ax.plot(
-            since_s[missing], measured.belief_delay_ms[missing], "x", ms=7, mew=2, color=COLORS[3]
+            since_s[missing],
+            measured.belief_delay_ms[missing],
+            "x",
+            ms=7,
+            mew=2,
+            color=STATE_COLORS[3],
         )
     ax.axvline(0, color=SWAP_COLOR, linewidth=1.4)
     ax.axvline(swap.ready_after_s, color=SWAP_COLOR, linewidth=1.4, linestyle=(0, (4, 3)))
@@ -295,7 +296,7 @@ def _state_patches(measured: Measured) -> list[Patch]:
 
 
 def _color(state: int) -> str:
-    return UNKNOWN_COLOR if state == NONE else COLORS[state % len(COLORS)]
+    return UNKNOWN_COLOR if state == NONE else state_color(state)
 
 
 def _tinted(color: str, share: float) -> tuple[float, float, float]:

@@ -75,7 +75,9 @@ def _draw_states(ax: Axes, replay: Replay, labels: Sequence[Stretch], seconds: A
         ),
     ]
     rows = [(name, bands) for name, bands in rows if bands]
-    names = list(dict.fromkeys(state for _, bands in rows for _, _, state in bands))
+    drawn = {state: None for _, bands in rows for _, _, state in bands}
+    of_task = [state for each in replay.beliefs[:1] for state in each.replayed.states]
+    names = list(dict.fromkeys([*of_task, *drawn]))
     for row, (_, bands) in enumerate(rows):
         for begin_s, end_s, state in bands:
             color = color_of(names.index(state))
@@ -84,7 +86,9 @@ def _draw_states(ax: Axes, replay: Replay, labels: Sequence[Stretch], seconds: A
     ax.grid(visible=False, axis="y")
     ax.set_title("Which state of the task it was taken for")
     ax.legend(
-        handles=[Patch(color=color_of(k), label=name) for k, name in enumerate(names)],
+        handles=[
+            Patch(color=color_of(k), label=name) for k, name in enumerate(names) if name in drawn
+        ],
         loc="center left",
         bbox_to_anchor=(1.0, 0.5),
     )

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from hmcs.palette import GRID_COLOR, INK, state_color
 from hmcs.recognition.model import Model
 from hmcs.shown import as_figure, as_html
 from hmcs.whole_files import written_whole
@@ -106,12 +107,15 @@ def _confusion(model: Model, judgment: Judgment) -> Figure:
     ax.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
     ax.set_xticks(range(len(names)), names, rotation=40, ha="right")
     ax.set_yticks(range(len(names)), names)
+    for number, labels in enumerate(zip(ax.get_xticklabels(), ax.get_yticklabels(), strict=True)):
+        for label in labels:
+            label.set_color(state_color(number))
     ax.set_xlabel("believed state")
     ax.set_ylabel("true state")
     for row, own in enumerate(shares):
         for column, share in enumerate(own):
             if matrix[row, column]:
-                color = "white" if share > 0.5 else "#222222"
+                color = "white" if share > 0.5 else INK
                 ax.text(column, row, f"{share:.0%}", ha="center", va="center", color=color)
     return picture
 
@@ -124,6 +128,7 @@ def _guides(model: Model) -> Figure:
     picture = Figure(figsize=(3.4 * columns, 3.0 * rows), layout="constrained")
     for number, name in enumerate(model.gesteme_names):
         ax: Any = picture.add_subplot(rows, columns, number + 1)
+        color = state_color(_state_of(model, name))
         points, spread = model.paths[name].points, model.spreads[name]
         first, second = sorted(np.argsort(np.ptp(points, axis=0))[-2:].tolist())
         flat = points[:, [first, second]]
@@ -131,15 +136,21 @@ def _guides(model: Model) -> Figure:
         lengths = np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
         across = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1) / lengths * spread[:, None]
         band = 1e3 * np.concatenate([flat + across, (flat - across)[::-1]])
-        ax.fill(*band.T, color="#0072B2", alpha=0.25, linewidth=0)
-        ax.plot(*(1e3 * flat).T, color="#0072B2", linewidth=1.8)
-        ax.plot(*(1e3 * flat[0]), "o", color="#222222", ms=5)
+        ax.fill(*band.T, color=color, alpha=0.25, linewidth=0)
+        ax.plot(*(1e3 * flat).T, color=color, linewidth=1.8)
+        ax.plot(*(1e3 * flat[0]), "o", color=INK, ms=5)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set_xlabel(f"{'xyz'[first]}, mm")
         ax.set_ylabel(f"{'xyz'[second]}, mm")
         ax.set_title(f"{as_figure(name)}: ± {1e3 * float(spread.mean()):.1f} mm", fontsize=10)
-        ax.grid(color="#e6e6e6", linewidth=0.6)
+        ax.grid(color=GRID_COLOR, linewidth=0.6)
     return picture
+
+
+def _state_of(model: Model, gesteme: str) -> int:
+    """The number of the state a gesteme belongs to, by whose color the page shows its guide."""
+    states = model.task.states
+    return next((number for number, state in enumerate(states) if gesteme in state.gestemes), 0)
 
 
 def _svg(picture: Figure) -> str:

@@ -47,7 +47,7 @@ def written(path: Path, text: str) -> Reader:
         name=text,
         hash=text,
         recognizer=text,
-        task=SimpleNamespace(name=text),
+        task=SimpleNamespace(name=text, states=()),
         demonstrations=(text, text),
         state_names=(text, "in"),
         gesteme_names=(text,),

@@ -16,8 +16,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC3311", "#AA4499", "#56B4E9", "#7A6A00")
-"""Distinct for all kinds of color vision; states beyond them begin again, with other marks."""
+from hmcs.palette import FAINT as FAINT
+from hmcs.palette import GRID_COLOR, state_color
+from hmcs.palette import INK as INK
+from hmcs.palette import STATE_COLORS as COLORS
+from hmcs.palette import UNKNOWN_COLOR as UNKNOWN_COLOR
+
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h")
 METHOD_COLORS = {
     "od-hmm": COLORS[0],
@@ -26,11 +30,7 @@ METHOD_COLORS = {
     "hmcs-gestemes": COLORS[3],
 }
 METHOD_MARKS = {"od-hmm": "o", "md-hmm": "s", "fft-hmm": "^", "hmcs-gestemes": "D"}
-UNKNOWN_COLOR = "#8C8C8C"
-INK = "#222222"
-FAINT = "#888888"
-GRID_COLOR = "#e6e6e6"
-CHANGE_COLOR = WRONG_COLOR = "#CC3311"
+CHANGE_COLOR = WRONG_COLOR = COLORS[3]
 WIDTH_IN = 10.0
 """Of every figure."""
 
@@ -105,7 +105,7 @@ def files_of(picture: Picture) -> Files:
 
 def color_of(index: int) -> str:
     """Return the color of a state or gesteme, by its number from 0."""
-    return COLORS[index % len(COLORS)]
+    return state_color(index)
 
 
 def mark_of(index: int) -> str:
