@@ -27,6 +27,7 @@ from hmcs.fixtures.controller.rules import rules_of
 from hmcs.recognizer_takeover import Question
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
+from hmcs_console.describing import Describing
 from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
@@ -55,6 +56,7 @@ HANDLE_HZ = 30.0
 than a few of these counts as let go."""
 _EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
+DESCRIBE_EVERY_S = 1.0
 WATCH_EVERY_S = 0.1
 """How often is looked at how a newcomer among the recognizers does."""
 UNWATCHED_EVERY_S = 1.0
@@ -87,6 +89,7 @@ class Console(Service):
         self._seen.marking = Marking(
             None if task is None else order_of(task), task is None or not _cued(task)
         )
+        self._describing = Describing(self._asking, self._seen, self.recordings.list)
         self._unwatched_until_s = 0.0
         # A trainer finds a task by the console's setting, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
@@ -113,6 +116,7 @@ class Console(Service):
         bus.every(1 / self.settings.rate_hz, self._show)
         bus.every(EVERY_S, lambda: seen.write_down(time.monotonic()))
         bus.every(HEALTH_EVERY_S, self._ask_health)
+        bus.every(DESCRIBE_EVERY_S, self._describing.ask)
         bus.every(WATCH_EVERY_S, self._swapping.watch)
         self.log.info("page", extra={"url": self.url})
 
@@ -219,7 +223,9 @@ class Console(Service):
             self._unwatched_until_s = now_s + UNWATCHED_EVERY_S
             operating = self._hands.operating
             picture = self._seen.picture(now_s, operating.operator, operating.lease.client)
-            self._painter.show(now_s, picture._replace(take=self.recordings.take))
+            self._painter.show(
+                now_s, picture._replace(take=self.recordings.take, lost=dict(self._hands.lost))
+            )
 
     def _ask(self, question: Question) -> None:
         if isinstance(question.body, Record):

@@ -12,11 +12,13 @@ from hmcs.recognition.model import Model
 from hmcs.task import Task
 from hmcs_console.drawing.scene import Scene
 from hmcs_console.drawing.surroundings import draw_ground, draw_workspace
+from hmcs_console.operating.handles import TookOver
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.page import Page
 from hmcs_console.teaching.timeline import TakePath
 from hmcs_console.telling.explained import Explained
+from hmcs_console.telling.operators import Operators
 from hmcs_console.telling.panel import Panel, Requests
 from hmcs_console.telling.sounds import Sounds
 
@@ -54,6 +56,7 @@ class View:
         self._path = TakePath(server.scene, np.array(start_m))
         self._panel = Panel(server.gui, requests, states, taught)
         self._explained = Explained(server.gui, self._panel.operating, self._panel.rules)
+        self._operators = Operators(server, self._panel.operating, self._take_over)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)
         self._sounds = Sounds(server, self._panel.operating)
@@ -71,9 +74,13 @@ class View:
             self._words_s = now_s
             with server.atomic():
                 self._panel.draw(picture)
+                self._operators.draw(picture)
                 self._explained.draw(picture, model)
                 fixture = picture.fixture
                 self._sounds.draw(now_s, None if fixture is None else fixture.off_guide_m)
+
+    def _take_over(self, client: int) -> None:
+        self.page.put(TookOver(client))
 
     def _followed(self, picture: Picture) -> Model | None:
         """The model of the recognizer that is followed; what was trained just now is one, too."""

@@ -16,6 +16,7 @@ from hmcs_console.operating.handles import (
     Operating,
     Pedaled,
     Stopped,
+    TookOver,
     after,
     waited,
 )
@@ -53,7 +54,9 @@ def test_what_other_pages_drag_moves_nothing_and_they_show_who_operates() -> Non
     outcome = after(operating, Grabbed(4, 10.1, THERE))
     assert outcome.operating == operating
     assert not outcome.handles
-    assert outcome.notices == ((4, "desk-page-3 operates: wait until that page lets go"),)
+    assert outcome.notices == (
+        (4, "another page operates: wait until it lets go, or press Take over"),
+    )
     assert after(operating, Moved(4, 10.1, THERE)).operating == operating
     assert after(operating, LetGo(4)).operating.operator == "desk-page-3"
 
@@ -74,6 +77,22 @@ def test_a_silent_page_has_released_the_handle_and_has_to_grab_it_anew() -> None
     assert [reported.dead_man for reported in outcome.handles] == [False]
     assert outcome.notices[0][0] == 3
     assert after(outcome.operating, Moved(3, 10.6, THERE)).operating.operator == ""
+
+
+def test_a_page_that_takes_over_releases_the_other_and_has_to_grab_the_handle_itself() -> None:
+    outcome = after(doing(Grabbed(3, 10.0, HERE)), TookOver(4))
+    assert [handle.dead_man for handle in outcome.handles] == [False]
+    assert outcome.operating.handle(LATER_S) is None
+    ((client, notice),) = outcome.notices
+    assert (client, "took over" in notice) == (3, True)
+    grabbed = after(outcome.operating, Grabbed(4, 11.0, HERE)).operating
+    assert grabbed.operator == "desk-page-4"
+
+
+def test_who_operates_takes_nothing_over_from_itself() -> None:
+    operating = doing(Grabbed(3, 10.0, HERE))
+    assert after(operating, TookOver(3)).operating == operating
+    assert after(Operating("desk"), TookOver(3)).notices == ()
 
 
 def test_stop_releases_whoever_operates_until_the_handle_is_grabbed_anew() -> None:

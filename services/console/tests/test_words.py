@@ -162,9 +162,9 @@ def test_how_to_engage_let_go_clutch_and_stop_is_reported() -> None:
         assert part in words.operating()
 
 
-def test_who_operates_is_reported() -> None:
-    assert "desk-page-1" in words.operates("desk-page-1")
-    assert "Nobody" in words.operates("")
+def test_a_running_recording_is_named_without_its_folder() -> None:
+    assert words.recording("/data/takes/show-1.mcap").endswith("**recording** to show-1.mcap")
+    assert words.recording("") == ""
 
 
 def test_what_is_marked_and_what_the_pedal_would_mark_is_reported() -> None:

@@ -79,8 +79,12 @@ def _registered() -> Mapping[str, EntryPoint]:
 
 def kinds() -> tuple[RecognizerSpec, ...]:
     """Return all registered kinds, the default first, then by name."""
-    names = sorted(_registered(), key=lambda name: (name != DEFAULT, name))
-    return tuple(kind_named(name) for name in names)
+    return tuple(map(kind_named, kind_names()))
+
+
+def kind_names() -> tuple[str, ...]:
+    """Return what the kinds are called, the default one first; none of them is imported."""
+    return tuple(sorted(_registered(), key=lambda name: (name != DEFAULT, name)))
 
 
 def kind_named(name: str) -> RecognizerSpec:

@@ -88,11 +88,17 @@ class Ruled(NamedTuple):
     rule: Rule
 
 
+class TookOver(NamedTuple):
+    """A page wants to operate instead of the one that does."""
+
+    client: int
+
+
 class Stopped(NamedTuple):
     """Somebody wants the robot to stand."""
 
 
-Event = Grabbed | Moved | LetGo | Gone | Alive | Clutched | Pedaled | Ruled | Stopped
+Event = Grabbed | Moved | LetGo | Gone | Alive | Clutched | Pedaled | Ruled | TookOver | Stopped
 
 
 class Operating(NamedTuple):
@@ -171,6 +177,10 @@ def after(operating: Operating, event: Event) -> Outcome:
             return Outcome(operating._replace(rules=_ruled(operating, client, rule)))
         case Pedaled(client, at_s) if leases.holds(operating.lease, client):
             return Outcome(operating._replace(pedal_until_s=at_s + PEDAL_S))
+        case TookOver(client) if operating.lease.client not in (None, client):
+            return _released(
+                operating, leases.FREE, "another page took over: grab the handle anew to go on"
+            )
         case Stopped():
             return _released(operating, leases.FREE, "stopped: grab the handle anew to go on")
         case _:
@@ -189,7 +199,7 @@ def waited(operating: Operating, now_s: float, lease_s: float) -> Outcome:
 def _after_grab(operating: Operating, event: Grabbed) -> Outcome:
     lease = leases.grabbed(operating.lease, event.client, event.at_s)
     if not leases.holds(lease, event.client):
-        notice = f"{operating.operator} operates: wait until that page lets go"
+        notice = "another page operates: wait until it lets go, or press Take over"
         return Outcome(operating, notices=((event.client, notice),))
     held = operating._replace(
         lease=lease,

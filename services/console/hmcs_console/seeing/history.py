@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 LONGEST_ROWS = 300
 EVERY_S = 0.1
 """How often a row is written down."""
-_SMALLEST, _LARGEST = 1e-9, 1e9
-"""Of a plot's limits."""
+_SMALLEST, _LARGEST = 1e-3, 1e9
+"""Of a plot's limits: ticks have three digits after the point, and smaller ones would read 0."""
 SPAN_S = LONGEST_ROWS * EVERY_S
 
 

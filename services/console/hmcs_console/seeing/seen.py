@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -34,6 +36,10 @@ T = TypeVar("T")
 NS_PER_S = 1_000_000_000
 FORGOTTEN_S = 2.0
 """What was not said again for so long is not shown as what is."""
+ANSWER_S = 20.0
+"""What came of a request is shown for so long, unless a robot may still move."""
+MAY_MOVE = "**may still move**"
+"""What is said of a robot that did not confirm a stop."""
 UNRUN_AFTER_S = 1.0
 """A recognizer that nobody has run for so long is shown as such; a swap has no such gap."""
 MOST_RECOGNIZERS = 32
@@ -80,6 +86,16 @@ class Picture(NamedTuple):
     """What is shown of a recording."""
     unrun: str = ""
     """Name of the recognizer that is followed where no process runs it; else empty."""
+    lost: Mapping[int, str] = MappingProxyType({})
+    """Why a page does not operate any more that did last, by its number."""
+    device: str = ""
+    """What the input device hears, e.g. `page`; empty where it has not reported."""
+    recording: str = ""
+    """Path of the recording that runs; empty where none does."""
+    folder: str = ""
+    """Of recordings, as the recorder sees it; empty where it has not reported."""
+    before: str = ""
+    """Name of the recognizer that was active before; empty where none was."""
 
 
 class Seen:
@@ -96,8 +112,18 @@ class Seen:
         self.health: dict[Member, Health] = {}
         self.training: TrainingProgress | None = None
         self.marking = Marking(None, by_pedal=True)
-        self.answer = ""
         self.takeover = ""
+        self.device = ""
+        """What the input device hears; empty where it has not reported."""
+        self.recording = ""
+        """Path of the recording that runs."""
+        self.folder = ""
+        """Of recordings."""
+        self.before = ""
+        """Which recognizer was active before."""
+        self._answer = ""
+        self._answered_s: float | None = None
+        """When the answer was shown first."""
         self._rows: Rows = ()
         self._robot: tuple[float, RobotState] | None = None
         self._fixture: tuple[float, FixtureState] | None = None
@@ -111,6 +137,21 @@ class Seen:
         """Which recognizer is followed, and when somebody was seen to run it, s."""
         self._robot_trail, self._hand_trail = Trail(), Trail()
         self._hand_offset: Points | None = None
+
+    @property
+    def answer(self) -> str:
+        """What came of the last thing that was asked for."""
+        return self._answer
+
+    @answer.setter
+    def answer(self, text: str) -> None:
+        self._answer, self._answered_s = text, None
+
+    def _shown_answer(self, now_s: float) -> str:
+        if self._answered_s is None:
+            self._answered_s = now_s
+        fades = MAY_MOVE not in self._answer
+        return "" if fades and now_s - self._answered_s >= ANSWER_S else self._answer
 
     def robot_moved(self, now_s: float, robot: RobotState) -> None:
         """Take in where the robot is."""
@@ -228,11 +269,15 @@ class Seen:
             health={member: self.health.get(member) for member in sorted(self.members)},
             training=self.training,
             marking=self.marking,
-            answer=self.answer,
+            answer=self._shown_answer(now_s),
             operator=operator,
             operating_client=client,
             takeover=self.takeover,
             unrun=self.unrun(now_s),
+            device=self.device,
+            recording=self.recording,
+            folder=self.folder,
+            before=self.before,
         )
 
     def _numbers(self, now_s: float) -> dict[str, float]:

@@ -3,11 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import viser
 
 from hmcs_console.serving.inbox import pressed_by
+
+PLAIN: Literal["gray"] = "gray"
+"""Color of a button that is neither the next thing to do nor ends anything."""
+STOP, GO, BACK, CANCEL = (
+    viser.Icon.HAND_STOP,
+    viser.Icon.PLAYER_PLAY,
+    viser.Icon.ARROW_BACK_UP,
+    viser.Icon.X,
+)
+TAG, TRAIN, REFRESH, SAVE, ADD, HIDE, REMOVE = (
+    viser.Icon.TAG,
+    viser.Icon.SCHOOL,
+    viser.Icon.REFRESH,
+    viser.Icon.DEVICE_FLOPPY,
+    viser.Icon.PLUS,
+    viser.Icon.EYE_OFF,
+    viser.Icon.ERASER,
+)
+HAND = viser.Icon.HAND_GRAB
 
 
 def on_click(button: viser.GuiButtonHandle, act: Callable[[], None]) -> None:

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import viser
 
+from hmcs_console.serving.appearance import with_appearance
+
 _FILE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 _SCRIPT = re.compile(rb"<script\b[^>]*>(.*?)</script>", re.DOTALL)
 
@@ -30,7 +32,7 @@ def load_document() -> Document:
     Only the script that stands in the file runs, and what that brings along; nothing is asked from
     or sent to elsewhere, and no other page may hold this one in a frame.
     """
-    body = _FILE.read_bytes()
+    body = with_appearance(_FILE.read_bytes())
     own = " ".join(f"'sha256-{_digest(found[1])}'" for found in _SCRIPT.finditer(body))
     policy = {
         "default-src": "'none'",

@@ -37,6 +37,8 @@ class Hands:
         self._handles = bus.publisher(Handle, bus.keys.handle)
         self._flooding: set[int] = set()
         """Pages that were warned that they send too much."""
+        self.lost: dict[int, str] = {}
+        """Why a page does not operate any more that did last, by its number."""
         self.operating = Operating(bus.source.instance)
         """How the pages operate now."""
 
@@ -52,6 +54,7 @@ class Hands:
                 self._stopped()
             elif isinstance(event, Gone):
                 self._flooding.discard(event.client)
+                self.lost.pop(event.client, None)
         for client, count in taken.dropped.items():
             self._flooded(client, count)
         self._follow(waited(self.operating, time.monotonic(), self._lease_s))
@@ -72,7 +75,11 @@ class Hands:
             self._handles.put(handle)
         for client, text in outcome.notices:
             self._page.tell(client, text)
+            if client == before.lease.client:
+                self.lost[client] = text
         holder = self.operating.lease.client
+        if holder is not None:
+            self.lost.pop(holder, None)
         if holder != before.lease.client:
             self._page.hold(holder)
             operator = self.operating.operator

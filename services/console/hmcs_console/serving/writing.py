@@ -43,6 +43,13 @@ def name_of_curve(name: str) -> str:
     return plain(name, _LONGEST_NAME)
 
 
+def name_button(button: viser.GuiButtonHandle, text: str) -> None:
+    """Call a button something else."""
+    shown = plain(text, _LONGEST_NAME)
+    if button.label != shown:
+        button.label = shown
+
+
 def notify(viewer: viser.ClientHandle, text: str, seconds: float) -> None:
     """Tell one viewer something, for a while."""
     viewer.add_notification(

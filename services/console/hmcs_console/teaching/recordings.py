@@ -68,6 +68,18 @@ class Recordings:
 
     # --- on the bus' thread -----------------------------------------------------------------------
 
+    def list(self) -> None:
+        """Have the recorder tell what recordings there are; what is shown stays as it is."""
+        member = self._recorder()
+        if member is None:
+            return
+
+        def come(answers: list[Answer[Outline]]) -> None:
+            for answer in answers[:1]:
+                self.take = self.take._replace(recordings=answer.body.recordings)
+
+        self._asking.ask(OUTLINE, member, OutlineQuestion(), come, timeout_s=READ_S)
+
     def _show(self, take: Take) -> None:
         self.take = take
 

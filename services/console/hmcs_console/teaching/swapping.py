@@ -55,6 +55,7 @@ class Swapping:
         now_s, members = time.monotonic(), self._seen.members
         active = self._seen.active(now_s)
         self._followed = takeover.followed(self._followed, active)
+        self._seen.before = self._followed.before
         if self._takeover is not None and self._takeover.under_way:
             agreed = self._seen.agreement(active).get(self._takeover.model, NOTHING_COMPARED)
             there = first_of("recognizer", members) is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import ceil
 from typing import Protocol
 
 import numpy as np
@@ -13,12 +14,23 @@ from viser import uplot
 from hmcs.shown import Markdown
 from hmcs_console.seeing.history import limits
 from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, states_of
-from hmcs_console.serving.buttons import on_change, on_click
+from hmcs_console.serving.buttons import (
+    ADD,
+    HIDE,
+    PLAIN,
+    REFRESH,
+    REMOVE,
+    SAVE,
+    TAG,
+    on_change,
+    on_click,
+)
 from hmcs_console.serving.writing import Choice, add_words, name_of_curve, write
 from hmcs_console.shapes.palette import FASTER, css
 from hmcs_console.shapes.pieces import add_pieces, draw_pieces
+from hmcs_console.telling.plots import PADDING_PX
 
-_HEIGHT_PX = 190
+_HEIGHT_PX = 210
 _SLIDER_STEPS = 1000
 _TRANSPARENT = "66"
 _PATH_M, _CHOSEN_M = 0.004, 0.012
@@ -63,20 +75,33 @@ class Timeline:
         self._slider: viser.GuiMultiSliderHandle[float] | None = None
         self._choice = Choice(gui, "Recording")
         self._choice.on_choice(editing.open)
-        on_click(gui.add_button("Refresh", hint="Look what there is now"), editing.refresh)
+        on_click(
+            gui.add_button("Refresh", color=PLAIN, icon=REFRESH, hint="Look what there is now"),
+            editing.refresh,
+        )
         self._shown = gui.add_folder("Labels", visible=False)
         with self._shown:
             self._chosen = add_words(gui, order=6.0)
             self._state = Choice(gui, "State", order=10.0)
-            label = gui.add_button("Label", order=11.0, hint="The chosen stretch is this state")
+            label = gui.add_button(
+                "Label", order=11.0, icon=TAG, hint="The chosen stretch is this state"
+            )
             on_click(label, self._label)
-            remove = gui.add_button("Remove", order=12.0, hint="The chosen stretch is no state")
+            remove = gui.add_button(
+                "Remove",
+                order=12.0,
+                color=PLAIN,
+                icon=REMOVE,
+                hint="The chosen stretch is no state",
+            )
             on_click(remove, editing.remove)
-            save = gui.add_button("Save", order=13.0, hint="Beside the recording, as .labels.csv")
+            save = gui.add_button(
+                "Save", order=13.0, icon=SAVE, hint="Beside the recording, as .labels.csv"
+            )
             on_click(save, editing.save)
-            use = gui.add_button("Use for training", order=14.0)
+            use = gui.add_button("Use for training", order=14.0, color=PLAIN, icon=ADD)
             on_click(use, lambda: use_for_training(self._drawn[0].path))
-            on_click(gui.add_button("Hide", order=15.0), editing.hide)
+            on_click(gui.add_button("Hide", order=15.0, color=PLAIN, icon=HIDE), editing.hide)
         self._said = add_words(gui)
 
     def draw(self, take: Take, states: tuple[str, ...]) -> None:
@@ -106,7 +131,8 @@ class Timeline:
     def _choose(self, chosen: Sequence[float]) -> None:
         # A page may say anything.
         if len(chosen) == 2 and np.all(np.isfinite(chosen)):
-            self._editing.choose(min(chosen), max(chosen))
+            lasts_s = self._drawn[0].duration_s
+            self._editing.choose(*(min(edge, lasts_s) for edge in sorted(chosen)))
 
     def _make_slider(self, take: Take) -> None:
         """Its ends cannot be moved while it is there, where pages hold it."""
@@ -116,8 +142,8 @@ class Timeline:
             self._slider = self._gui.add_multi_slider(
                 "From, to (s)",
                 min=0.0,
-                max=max(take.duration_s, 1e-3),
-                step=max(take.duration_s, 1e-3) / _SLIDER_STEPS,
+                max=_end_s(take),
+                step=_end_s(take) / _SLIDER_STEPS,
                 initial_value=take.chosen_s,
                 order=5.0,
             )
@@ -138,7 +164,7 @@ class Timeline:
             self._plot.remove()
         series: tuple[uplot.Series, ...] = (
             uplot.Series(label="s"),
-            uplot.Series(label="speed, m/s", stroke=css(FASTER), width=1.5),
+            uplot.Series(label="speed", stroke=css(FASTER), width=1.5),
             uplot.Series(label="chosen", width=0, fill=css(CHOSEN) + _TRANSPARENT),
             *(
                 uplot.Series(
@@ -151,8 +177,19 @@ class Timeline:
         )
         with self._shown:
             self._plot = self._gui.add_uplot(
-                data, series, scales=scales, height=_HEIGHT_PX, order=1.0
+                data,
+                series,
+                scales=scales,
+                title="speed, m/s, over time, s",
+                height=_HEIGHT_PX,
+                padding=PADDING_PX,
+                order=1.0,
             )
+
+
+def _end_s(take: Take) -> float:
+    """The end of the slider, in round hundredths of a second: a few digits that can be read."""
+    return max(ceil(take.duration_s * 100), 1) / 100
 
 
 class TakePath:

@@ -6,12 +6,23 @@ from typing import Any, Protocol
 
 import viser
 
+from hmcs.recognition.registry import kind_names
 from hmcs.recognizer_takeover import Question, activate
 from hmcs.shown import plain
 from hmcs_console.seeing.seen import Picture
-from hmcs_console.serving.buttons import on_change, on_click
+from hmcs_console.serving.buttons import (
+    BACK,
+    CANCEL,
+    GO,
+    PLAIN,
+    STOP,
+    TAG,
+    TRAIN,
+    on_change,
+    on_click,
+)
 from hmcs_console.serving.inbox import pressed_by
-from hmcs_console.serving.writing import Choice, add_words, write
+from hmcs_console.serving.writing import Choice, add_words, name_button, write
 from hmcs_console.teaching import requests
 from hmcs_console.teaching.timeline import Editing, Timeline
 from hmcs_console.telling import words
@@ -65,17 +76,21 @@ class Panel:
         self._gui = gui
         self._requests = carried_out_by
         self._states = states
+        self._folder = ""
         stop = gui.add_button(
-            "Stop", color="red", hint="Every robot stands, no matter who drives it"
+            "Stop",
+            color="red",
+            icon=STOP,
+            hint="Every robot stands, no matter who drives it",
         )
         on_click(stop, carried_out_by.stop)
+        self._recording = add_words(gui)
         self._answer = add_words(gui)
         tabs = gui.add_tab_group()
         self.operating = tabs.add_tab("Operate")
         with self.operating:
             with gui.add_folder("How to engage, clutch and stop", expand_by_default=False):
                 add_words(gui, words.operating())
-            self._operator = add_words(gui, words.operates(""))
             self._doing = add_words(gui)
             self._why = add_words(gui, words.why(None))
         self._plots_tab = tabs.add_tab("Plots")
@@ -84,9 +99,11 @@ class Panel:
         with tabs.add_tab("Recognizers"):
             self._recognizers = add_words(gui)
             self._choice = Choice(gui, "Recognizer")
-            on_click(gui.add_button("Activate"), self._activate)
-            back = gui.add_button("Back", hint="To the one that was active before")
-            on_click(back, carried_out_by.back)
+            on_click(gui.add_button("Activate", icon=GO), self._activate)
+            self._back = gui.add_button(
+                "Back", color=PLAIN, icon=BACK, hint="To the one that was active before"
+            )
+            on_click(self._back, carried_out_by.back)
         self.rules = tabs.add_tab("Task")
         with tabs.add_tab("Teach"):
             self._add_teaching(task)
@@ -98,7 +115,8 @@ class Panel:
     def draw(self, picture: Picture) -> None:
         """Write down a moment."""
         self._take_states(picture.states)
-        write(self._operator, words.operates(picture.operator))
+        write(self._recording, words.recording(picture.recording))
+        name_button(self._back, f"Back to {picture.before}" if picture.before else "Back")
         write(self._doing, words.doing(picture.fixture, picture.robot))
         write(self._why, words.why(picture.belief))
         nobody = bool(picture.unrun)
@@ -114,6 +132,8 @@ class Panel:
         self._offer(picture.recognizers)
         self._plots.draw(picture.rows)
         self._timeline.draw(picture.take, picture.states)
+        self._folder = picture.folder
+        self._offered.offer(picture.take.recordings, none_too=True)
 
     def _add_teaching(self, task: str) -> None:
         gui = self._gui
@@ -122,7 +142,8 @@ class Panel:
             record = gui.add_button_group("Recording", ("Begin", "End"))
         with gui.add_folder("Label"):
             self._label = Choice(gui, "State", self._states)
-            on_click(gui.add_button("Mark", hint="The hand is in it from now on"), self._mark)
+            mark = gui.add_button("Mark", icon=TAG, hint="The hand is in it from now on")
+            on_click(mark, self._mark)
             pedal = gui.add_checkbox(
                 "Pedal begins the next part",
                 self._requests.marks_by_pedal,
@@ -132,22 +153,31 @@ class Panel:
         with gui.add_folder("Train"):
             model = gui.add_text("Model", "taught")
             task_name = gui.add_text("Task", task)
+            self._offered = Choice(gui, "Add recording")
+            self._offered.on_choice(self._add_recording)
             self._files = gui.add_text("Demonstrations", "", hint="Files, as the trainer sees them")
-            kind = gui.add_text("Recognizer", "", hint="The default one where it is empty")
+            kind = Choice(gui, "Recognizer", kind_names())
             find_states = gui.add_checkbox("Find states (no labels needed)", False)
-            train = gui.add_button("Train")
-            on_click(gui.add_button("Cancel"), lambda: self._requests.ask(requests.cancel()))
+            train = gui.add_button("Train", icon=TRAIN)
+            cancel = gui.add_button("Cancel", color=PLAIN, icon=CANCEL)
+            on_click(cancel, lambda: self._requests.ask(requests.cancel()))
             self._progress = gui.add_progress_bar(0.0)
             self._training = add_words(gui)
             on_click(
                 gui.add_button(
                     "Activate what was trained",
+                    icon=GO,
                     hint="After it ran for a while beside the one that is active",
                 ),
                 self._requests.take_over,
             )
             on_click(
-                gui.add_button("Activate now", hint="Without comparing it any longer"),
+                gui.add_button(
+                    "Activate now",
+                    color=PLAIN,
+                    icon=GO,
+                    hint="Without comparing it any longer",
+                ),
                 self._requests.activate_now,
             )
             self._takeover = add_words(gui)
@@ -165,7 +195,7 @@ class Panel:
                     model.value,
                     task_name.value,
                     self._files.value,
-                    kind.value,
+                    kind.chosen,
                     find_states=find_states.value,
                 )
             except requests.RequestError as error:
@@ -181,6 +211,10 @@ class Panel:
     def _activate(self) -> None:
         if self._choice.chosen:
             self._requests.ask(activate(self._choice.chosen))
+
+    def _add_recording(self, name: str) -> None:
+        self._offered.choose("")
+        self._use_for_training(f"{self._folder}/{name}" if self._folder else name)
 
     def _use_for_training(self, path: str) -> None:
         if plain(path, _LONGEST_PATH) != path:

@@ -22,6 +22,8 @@ from hmcs_console.shapes.palette import (
     css,
 )
 
+PADDING_PX = (10, 24, 0, 0)
+"""Top, right, bottom, left: the highest tick is read whole."""
 _HEIGHT_PX = 170
 _SHARE = (0.0, 1.05)
 
@@ -40,19 +42,24 @@ class Plots:
 
     def __init__(self, gui: viser.GuiApi, states: Sequence[str]) -> None:
         self._plots = [
-            _Plot(gui, "state probabilities", _probabilities(states), _SHARE),
-            _Plot(gui, "fixturing factor", (Curve("factor", "k", DIRECTION),), _SHARE),
+            _Plot(gui, "probability of each state, last 30 s", _probabilities(states), _SHARE),
             _Plot(
                 gui,
-                "speed, m/s",
+                "stiffness k, 0.5 free to 1, last 30 s",
+                (Curve("factor", "k", DIRECTION),),
+                _SHARE,
+            ),
+            _Plot(
+                gui,
+                "speed, m/s, last 30 s",
                 (Curve("operator", "operator", FASTER), Curve("robot", "robot", SLOWER)),
             ),
             _Plot(
                 gui,
-                "distance, m",
+                "distance, m, last 30 s",
                 (Curve("guide", "to the guide", FASTER), Curve("obstacle", "obstacle", SLOWER)),
             ),
-            _Plot(gui, "latency, ms", _latencies()),
+            _Plot(gui, "latency, ms, last 30 s", _latencies()),
         ]
 
     def draw(self, rows: Rows) -> None:
@@ -90,6 +97,7 @@ class _Plot:
             title=title,
             scales=_scales(self._limits),
             height=_HEIGHT_PX,
+            padding=PADDING_PX,
         )
 
     def draw(self, rows: Rows) -> None:

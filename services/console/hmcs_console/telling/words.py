@@ -10,6 +10,7 @@ from hmcs.recognizer_takeover import Agreement
 from hmcs.shown import Markdown
 from hmcs_console.seeing.marking import Marking
 
+RECORDING = "#D00000"
 MOST_NAMES = 12
 """Of a list of names so many are written out."""
 _LINES, _PARAGRAPHS = Markdown("  \n"), Markdown("\n\n")
@@ -80,11 +81,17 @@ def recognizers(
     return _LINES.join(lines)
 
 
-def operates(operator: str) -> Markdown:
-    """Return who operates."""
-    if not operator:
-        return Markdown("Nobody operates: drag the handle at the tool.")
-    return Markdown("**{}** operates.").format(operator)
+def recording(path: str) -> Markdown:
+    """Return that something is being recorded, and to which file; nothing where it is not."""
+    if not path:
+        return Markdown("")
+    name = path.rpartition("/")[2]
+    return Markdown("{} **recording** to {}").format(dot(RECORDING), name)
+
+
+def dot(color: str) -> Markdown:
+    """Return a dot in a color of this house, `#rrggbb`."""
+    return Markdown(f'<span style="color:{color}">●</span>')
 
 
 def operating() -> Markdown:
