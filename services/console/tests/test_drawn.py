@@ -14,6 +14,7 @@ import yourdfpy
 from numpy.testing import assert_allclose
 
 from hmcs.bus.messages import Motion, RobotDescription, RobotState
+from hmcs_console.drawing.drawn_guides import thickness_of
 from hmcs_console.drawing.drawn_robot import DrawnRobot
 from hmcs_console.drawing.robot_model import joints_of, load_robot, written
 from hmcs_console.seeing.seen import FORGOTTEN_S, Seen
@@ -59,6 +60,12 @@ def test_a_mesh_finds_its_materials_beside_it(tmp_path: Path) -> None:
     names = written({"m/link.obj": b"1", "m/link.mtl": b"2", "n/link.obj": b"3"}, tmp_path)
     assert Path(names["m/link.obj"]).with_suffix(".mtl").read_bytes() == b"2"
     assert Path(names["n/link.obj"]).read_bytes() == b"3"
+
+
+def test_a_guide_is_drawn_thicker_the_stiffer_the_fixture_is() -> None:
+    free, half, stiff = map(thickness_of, (0.5, 0.75, 1.0))
+    assert free < half < stiff
+    assert thickness_of(0.0) == free
 
 
 def moving() -> yourdfpy.URDF:

@@ -23,7 +23,7 @@ def picture(operating: int | None = None, **fields: Any) -> Picture:
     [
         (picture(3), "**You operate.**"),
         (picture(4), "**Another page operates.**"),
-        (picture(device="recorded", lost={3: "silent"}), "**recorded drives**"),
+        (picture(device="recorded", lost={3: "silent"}), "**The source *recorded* drives**"),
         (picture(health={}), "no input device is there"),
         (picture(lost={3: "this page was silent"}), "any more**: this page was silent"),
         (picture(lost={4: "this page was silent"}), "Nobody operates."),

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from hmcs.fixtures.compliance.factor import FREE_FACTOR
 from hmcs.recognition.model import Model
 from hmcs_console.drawing.layout import Layout, anchored, laid_out
 from hmcs_console.drawing.nodes import node
@@ -17,7 +18,11 @@ from hmcs_console.seeing.seen import Picture
 from hmcs_console.shapes.geometry import line
 from hmcs_console.shapes.palette import color_of, faint
 
-_LEADING_M, _FAINT_M = 0.008, 0.003
+_FREE_M, _STIFF_M, _FAINT_M = 0.004, 0.016, 0.003
+"""How thick a guide is where the fixture is free, where it is as stiff as can be, and where the
+guide does not lead."""
+_THICKER_M = 5e-4
+"""A change of thickness that is drawn."""
 _NEAR_M = 1e-4
 """A guide that lies no farther from where it lay has not moved."""
 
@@ -37,6 +42,8 @@ class DrawnGuides:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
         self._lead = scene.add_frame("/guide", show_axes=False, visible=False)
+        self._path: viser.LineSegmentsHandle | None = None
+        """Of the guide that leads, as thick as the fixture is stiff."""
         self._frame = scene.add_frame("/guides", show_axes=False)
         self._begin(None)
 
@@ -50,7 +57,7 @@ class DrawnGuides:
         for state, handle in self._lines.items():
             leads = leading is not None and state == leading.state
             handle.visible = state in self._layout.places and not leads
-        self._draw_leading(model, leading, picture.states)
+        self._draw_leading(model, leading, picture)
 
     def _begin(self, model: Model | None) -> None:
         self._model = model
@@ -101,31 +108,40 @@ class DrawnGuides:
             if state in layout.places:
                 handle.position = layout.places[state]
 
-    def _draw_leading(
-        self, model: Model | None, leading: Leading | None, states: tuple[str, ...]
-    ) -> None:
+    def _draw_leading(self, model: Model | None, leading: Leading | None, picture: Picture) -> None:
         self._lead.visible = leading is not None and model is not None
         if leading is None or model is None:
             return
         if leading[:2] != self._led:
             self._led = leading[:2]
-            self._make_leading(model, leading, states)
+            self._make_leading(model, leading, picture.states)
         self._lead.position = leading.origin
+        if self._path is not None and picture.fixture is not None:
+            thickness_m = thickness_of(picture.fixture.factor)
+            if abs(self._path.thickness - thickness_m) >= _THICKER_M:
+                self._path.thickness = thickness_m
 
     def _make_leading(self, model: Model, leading: Leading, states: tuple[str, ...]) -> None:
+        self._path = None
         self._lead.remove()
         self._lead = self._scene.add_frame("/guide", show_axes=False)
         guide = guide_of(model, leading.state, leading.gesteme)
         if guide is None:
             return
         color = color_of(leading.state, states)
-        self._scene.add_line_segments(
-            "/guide/path", line(guide.points), color, thickness=_LEADING_M
+        self._path = self._scene.add_line_segments(
+            "/guide/path", line(guide.points), color, thickness=_FREE_M
         )
         if guide.volume is not None:
             self._scene.add_mesh_simple(
                 "/guide/volume", *guide.volume, color=color, opacity=0.2, side="double"
             )
+
+
+def thickness_of(factor: float) -> float:
+    """Return how thick the guide that leads is drawn, m, for a fixturing factor."""
+    stiff = max(factor - FREE_FACTOR, 0.0) / (1.0 - FREE_FACTOR)
+    return _FREE_M + (_STIFF_M - _FREE_M) * stiff
 
 
 def _leading_in(picture: Picture) -> Leading | None:

@@ -25,7 +25,7 @@ _STYLE = """
 .mantine-Tabs-tab { min-height: 2.4em; }
 /* A word is not broken where it stands before its field. */
 label {
-  overflow-wrap: normal !important; word-break: normal !important; font-size: 0.8em !important;
+  overflow-wrap: normal !important; word-break: normal !important; font-size: 0.85em !important;
 }
 /* The ends of a slider are read whole. */
 .multi-slider-mark-wrapper:last-of-type .multi-slider-mark-label { right: 0; }

@@ -37,6 +37,7 @@ from hmcs_console.operating.rules import (
     position_of,
     rule_of,
 )
+from hmcs_console.serving.buttons import PLAIN
 from hmcs_console.serving.inbox import Inbox, PageEvents, Press
 from hmcs_console.serving.server import Server
 from hmcs_console.serving.writing import notify
@@ -153,7 +154,9 @@ class Page:
     def _give_controls(self, client: viser.ClientHandle) -> None:
         number = client.client_id
         clutch = client.gui.add_checkbox("Clutch", False, hint="Moves the handle, not the robot")
-        pedal = client.gui.add_button("Pedal", hint="Hold: a mark, or a cue to the fixture")
+        pedal = client.gui.add_button(
+            "Pedal", color=PLAIN, hint="Hold: a mark, or a cue to the fixture"
+        )
         kept_to = client.gui.add_dropdown(
             "Keep to",
             tuple(KEPT_TO),

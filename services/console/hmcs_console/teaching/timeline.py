@@ -28,7 +28,7 @@ from hmcs_console.serving.buttons import (
 from hmcs_console.serving.writing import Choice, add_words, name_of_curve, write
 from hmcs_console.shapes.palette import FASTER, css
 from hmcs_console.shapes.pieces import add_pieces, draw_pieces
-from hmcs_console.telling.plots import PADDING_PX
+from hmcs_console.telling.plots import with_room
 
 _HEIGHT_PX = 210
 _SLIDER_STEPS = 1000
@@ -153,7 +153,7 @@ class Timeline:
         data = bands(take, named)
         scales: dict[str, uplot.Scale] = {
             "x": uplot.Scale(time=False, auto=False, range=(0.0, max(take.duration_s, 1e-3))),
-            "y": uplot.Scale(auto=False, range=limits(data[1:])),
+            "y": uplot.Scale(auto=False, range=with_room(limits(data[1:]))),
         }
         if self._plot is not None and named == self._series:
             self._plot.scales = scales
@@ -182,7 +182,6 @@ class Timeline:
                 scales=scales,
                 title="speed, m/s, over time, s",
                 height=_HEIGHT_PX,
-                padding=PADDING_PX,
                 order=1.0,
             )
 

@@ -82,8 +82,8 @@ def operates(picture: Picture, client: int) -> Markdown:
         )
     if picture.device not in ("", PAGE):
         return Markdown(
-            "**{} drives**, the handle here moves nothing: to drive from the page start the input "
-            "device with the source *page*."
+            "**The source *{}* drives**: the handle here moves nothing. To drive from here, start "
+            "the input device with the source *page*."
         ).format(picture.device)
     if not _is_there("input_device", picture.health):
         return Markdown(

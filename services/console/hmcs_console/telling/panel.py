@@ -116,9 +116,10 @@ class Panel:
         """Write down a moment."""
         self._take_states(picture.states)
         write(self._recording, words.recording(picture.recording))
+        self._recording.visible = bool(picture.recording)
         name_button(self._back, f"Back to {picture.before}" if picture.before else "Back")
         write(self._doing, words.doing(picture.fixture, picture.robot))
-        write(self._why, words.why(picture.belief))
+        write(self._why, words.why(picture.belief, picture.states))
         nobody = bool(picture.unrun)
         text = words.recognizers(picture.active, picture.agreement, nobody_runs_it=nobody)
         write(self._recognizers, text)

@@ -22,10 +22,9 @@ from hmcs_console.shapes.palette import (
     css,
 )
 
-PADDING_PX = (10, 24, 0, 0)
-"""Top, right, bottom, left: the highest tick is read whole."""
 _HEIGHT_PX = 170
-_SHARE = (0.0, 1.05)
+_SHARE = (0.0, 1.0)
+_ROOM = 0.08
 
 
 class Curve(NamedTuple):
@@ -97,7 +96,6 @@ class _Plot:
             title=title,
             scales=_scales(self._limits),
             height=_HEIGHT_PX,
-            padding=PADDING_PX,
         )
 
     def draw(self, rows: Rows) -> None:
@@ -115,8 +113,14 @@ class _Plot:
 def _scales(limits: tuple[float, float]) -> dict[str, uplot.Scale]:
     return {
         "x": uplot.Scale(time=False, auto=False, range=(-SPAN_S, 0.0)),
-        "y": uplot.Scale(auto=False, range=limits),
+        "y": uplot.Scale(auto=False, range=with_room(limits)),
     }
+
+
+def with_room(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return limits with room for the whole label of the highest tick."""
+    lower, upper = limits
+    return lower, upper + _ROOM * (upper - lower)
 
 
 def _probabilities(states: Sequence[str]) -> tuple[Curve, ...]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from hmcs.fixtures.controller.rules import Rules, rules_of
 from hmcs.shown import Markdown
 from hmcs.task import Task
 from hmcs.task.fixture_parts import VolumeSetup
+from hmcs_console.shapes.palette import color_of, css
+from hmcs_console.telling.words import dot
 
-_HEAD = Markdown("| state | law, compliance | ξ | volume, radius | leads |\n|---|---|---|---|---|")
+_HEAD = Markdown("| state | law, compliance | up to k | tube, mm | leads |\n|---|---|---|---|---|")
 
 
 def rules(task: Task | None, state_now: str) -> Markdown:
@@ -18,15 +22,16 @@ def rules(task: Task | None, state_now: str) -> Markdown:
     if task is None:
         return Markdown("No recognizer is followed whose model is known here.")
     every = rules_of(task)
+    names = [state.name for state in task.states]
     rows = [
-        _row(state.name, every.in_state(state.name), state.name == state_now)
+        _row(state.name, names, every.in_state(state.name), state.name == state_now)
         for state in task.states
     ]
     name = Markdown("**{}**").format(task.name)
     return Markdown("\n").join([name, Markdown(""), _HEAD, *rows])
 
 
-def _row(state: str, rules: Rules, now: bool) -> Markdown:
+def _row(state: str, states: Sequence[str], rules: Rules, now: bool) -> Markdown:
     cells = (
         state,
         f"{rules.fixture.law}, {_compliance(rules)}",
@@ -35,7 +40,8 @@ def _row(state: str, rules: Rules, now: bool) -> Markdown:
         _aim(rules),
     )
     cell = Markdown("**{}**" if now else "{}")
-    return Markdown("| {} |").format(Markdown(" | ").join(map(cell.format, cells)))
+    shown = Markdown(" | ").join(map(cell.format, cells))
+    return Markdown("| {} {} |").format(dot(css(color_of(state, states))), shown)
 
 
 def _compliance(rules: Rules) -> str:

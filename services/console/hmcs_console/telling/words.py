@@ -9,8 +9,9 @@ from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, Training
 from hmcs.recognizer_takeover import Agreement
 from hmcs.shown import Markdown
 from hmcs_console.seeing.marking import Marking
+from hmcs_console.shapes.palette import color_of, css
 
-RECORDING = "#D00000"
+RECORDING = "#d00000"
 MOST_NAMES = 12
 """Of a list of names so many are written out."""
 _LINES, _PARAGRAPHS = Markdown("  \n"), Markdown("\n\n")
@@ -33,13 +34,16 @@ def several(names: Sequence[str]) -> Markdown:
     return Markdown("{} and {} more").format(listed, more) if more > 0 else listed
 
 
-def why(belief: Belief | None) -> Markdown:
+def why(belief: Belief | None, states: Sequence[str] = ()) -> Markdown:
     """Return what is recognized, and what that stands on."""
     if belief is None or not belief.states:
         return Markdown("**Nothing is recognized**: no recognizer has said anything yet.")
     lines = [
-        Markdown("**{}** {:.0%}, unknown {:.0%}").format(
-            belief.likely_state, belief.confidence, belief.unknown
+        Markdown("{} **{}** {:.0%}, unknown {:.0%}").format(
+            dot(css(color_of(belief.likely_state, states))),
+            belief.likely_state,
+            belief.confidence,
+            belief.unknown,
         ),
         Markdown("gesteme {}, since step {} of {}").format(
             belief.likely_gesteme or "—", belief.segment_start, belief.step
@@ -91,7 +95,7 @@ def recording(path: str) -> Markdown:
 
 def dot(color: str) -> Markdown:
     """Return a dot in a color of this house, `#rrggbb`."""
-    return Markdown(f'<span style="color:{color}">●</span>')
+    return Markdown(f'<span style="color:{color.lower()}">●</span>')
 
 
 def operating() -> Markdown:
