@@ -11,14 +11,14 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from hmcs import process_words
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Health
 from hmcs.bus.session import Bus
+from hmcs.process_words import ILL, LATE, LOST, NOBODY, OK, REFUSED, process_name
 from hmcs.shown import plain
 from hmcs_local.asking import left_out
 from hmcs_local.observer import Observation, Sighting, observe
-
-NOBODY = "nobody is there: bring the stack up with `hmcs up`"
 
 _LOOK_EVERY_S = 1.0
 _WIDTH_FOR_DETAILS = 110
@@ -54,9 +54,9 @@ class Row(NamedTuple):
 
 def row(now: Sighting, before: Sighting | None) -> Row:
     """Return a process' line; over its whole life where `before` is None or of another boot."""
-    process, health = _name(now.member), now.health
+    process, health = process_name(now.member), now.health
     if health is None:
-        return Row(process, False, "present, but does not answer", 0, 0, 0, 0, 0, 0, 0)
+        return Row(process, False, process_words.NO_ANSWER, 0, 0, 0, 0, 0, 0, 0)
     same_life = before is not None and before.boot == now.boot
     then = (before.health if before and same_life else None) or _NOTHING
     seconds = max(health.uptime_s - then.uptime_s, 1e-3)
@@ -88,10 +88,12 @@ def remarks(now: Observation, before: Observation | None) -> list[str]:
     for fixture, model in _followed(now.sightings):
         if not now.speakers.get(model):
             went = before.speakers.get(model, ()) if before else ()
-            gone = f": {', '.join(map(_name, went))} went while it was active" if went else ""
+            gone = (
+                f": {', '.join(map(process_name, went))} went while it was active" if went else ""
+            )
             running = ", ".join(now.speakers) or "none"
             found.append(
-                f"{_name(fixture)} follows {plain(model)}, but nobody runs it{gone} "
+                f"{process_name(fixture)} {process_words.unrun(plain(model))}{gone} "
                 f"(models that are run: {running})"
             )
     return found
@@ -146,12 +148,6 @@ def _followed(sightings: Iterable[Sighting]) -> list[tuple[Member, str]]:
     ]
 
 
-def _name(member: Member) -> str:
-    """How a process is called on the screen."""
-    service, process = member
-    return process if process.startswith(service.replace("_", "-")) else f"{service}/{process}"
-
-
 def _picture(bus: Bus, now: Observation, before: Observation | None, width: int) -> Group:
     sightings = now.sightings
     where = Text(f"cell {bus.settings.cell} on {bus.settings.router}")
@@ -162,7 +158,7 @@ def _picture(bus: Bus, now: Observation, before: Observation | None, width: int)
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("process", no_wrap=True)
     table.add_column("")
-    for name in ("in/s", "out/s", "lost", "refused", "late", "cpu %", "up s"):
+    for name in ("in/s", "out/s", LOST, REFUSED, LATE, "cpu %", "up s"):
         table.add_column(name, justify="right", no_wrap=True)
     if width >= _WIDTH_FOR_DETAILS:
         table.add_column("detail")
@@ -171,7 +167,7 @@ def _picture(bus: Bus, now: Observation, before: Observation | None, width: int)
     for line in lines:
         table.add_row(
             Text(line.process),
-            Text("ok", style="green") if line.healthy else Text("ill", style="red"),
+            Text(OK, style="green") if line.healthy else Text(ILL, style="red"),
             f"{line.received_hz:.0f}",
             f"{line.sent_hz:.0f}",
             *(_count(count) for count in (line.lost, line.refused, line.late)),

@@ -142,11 +142,16 @@ def test_services_tell_how_they_are_and_what_was_lost_late_and_refused() -> None
             Member("trainer", "c"): health(healthy=False, detail="stuck"),
         }
     )
-    robot_a, task_hmm_b, trainer_c = said.split("\n\n")
-    assert robot_a == "**robot** a, 100 Hz  \nruns  \nlost 3, late 0, refused 4"
-    assert "has not reported" in task_hmm_b
-    assert "**unhealthy**: stuck" in trainer_c
-    assert words.services({}) == "Nobody is there."
+    table, *doing = said.split("\n\n")
+    head, _, *rows = table.splitlines()
+    assert head == "| process | | lost | refused | late |"
+    assert rows[-1].startswith("| robot/a |")
+    assert rows[-1].endswith("ok | 3 | 4 | 0 |")
+    assert [row.count("ill") for row in rows] == [1, 1, 0]
+    assert "ill: present, but does not answer" in doing[0]
+    assert "**trainer/c**: ill: stuck" in doing
+    assert doing[-1] == "**robot/a**: runs"
+    assert "nobody is there" in words.services({})
 
 
 def test_a_training_tells_its_stage_and_where_the_model_is() -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from hmcs import process_words
 from hmcs.bus.keys import Member
 from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, TrainingProgress
+from hmcs.palette import STATE_COLORS
+from hmcs.process_words import ILL, LATE, LOST, NOBODY, OK, REFUSED, detail, process_name, well
 from hmcs.recognizer_takeover import Agreement
 from hmcs.shown import Markdown
 from hmcs_console.seeing.marking import Marking
@@ -14,6 +17,8 @@ from hmcs_console.shapes.palette import color_of, css
 RECORDING = "#d00000"
 MOST_NAMES = 12
 """Of a list of names so many are written out."""
+_ROWS = Markdown("\n")
+_HEAD = Markdown(f"| process | | {LOST} | {REFUSED} | {LATE} |\n|---|---|---|---|---|")
 _LINES, _PARAGRAPHS = Markdown("  \n"), Markdown("\n\n")
 _REASONS = {
     "guiding": "guides: the state is recognized",
@@ -72,9 +77,7 @@ def recognizers(
     lines = [Markdown("follows **{}**").format(active or "no recognizer")]
     if nobody_runs_it:
         lines = [
-            Markdown("**follows {}, which nobody runs**: start one, or activate another").format(
-                active
-            )
+            Markdown("**{}**: start one, or activate another").format(process_words.unrun(active))
         ]
     for name, agreed in agreement.items():
         if agreed.compared:
@@ -110,11 +113,18 @@ def operating() -> Markdown:
 
 
 def services(health: Mapping[Member, Health | None], unrun: str = "") -> Markdown:
-    """Return how every process is that is there, and which recognizer is followed unrun."""
-    lines = [_process(member, how) for member, how in health.items()]
+    """Return how every process is that is there, and which recognizer is followed unrun.
+
+    A table of what was counted, then what each does; those that are ill come first.
+    """
+    if not health:
+        return Markdown("{}").format(NOBODY)
+    ordered = sorted(health.items(), key=lambda each: well(each[1]) == OK)
+    rows = [_ROWS.join([_HEAD, *(_row(*each) for each in ordered)])]
     if unrun:
-        lines.insert(0, Markdown("**The fixture follows {}, which nobody runs.**").format(unrun))
-    return _PARAGRAPHS.join(lines) if lines else Markdown("Nobody is there.")
+        line = Markdown("**The fixture {}.**").format(process_words.unrun(unrun))
+        rows.insert(0, line)
+    return _PARAGRAPHS.join([*rows, *(_doing(*each) for each in ordered)])
 
 
 def training(progress: TrainingProgress | None) -> Markdown:
@@ -179,18 +189,15 @@ def _standing(robot: RobotState) -> Markdown:
     return Markdown("follows")
 
 
-def _process(member: Member, health: Health | None) -> Markdown:
-    name = Markdown("**{}** {}").format(*member)
-    if health is None:
-        return _LINES.join([name, Markdown("has not reported its health")])
-    lost, late, refused = (
-        sum(counted.values()) for counted in (health.lost, health.late, health.refused)
-    )
-    how = Markdown("{}") if health.healthy else Markdown("**unhealthy**: {}")
-    return _LINES.join(
-        [
-            Markdown("{}, {:.0f} Hz").format(name, health.loop_rate_hz),
-            how.format(health.detail),
-            Markdown("lost {}, late {}, refused {}").format(lost, late, refused),
-        ]
-    )
+def _row(member: Member, health: Health | None) -> Markdown:
+    shown = dot(STATE_COLORS[2] if well(health) == OK else RECORDING)
+    counts: Sequence[object] = ("", "", "")
+    if health is not None:
+        counts = [sum(each.values()) for each in (health.lost, health.refused, health.late)]
+    cells = Markdown(" | ").join(Markdown("{}").format(count) for count in counts)
+    return Markdown("| {} | {} {} | {} |").format(process_name(member), shown, well(health), cells)
+
+
+def _doing(member: Member, health: Health | None) -> Markdown:
+    ill = Markdown("") if well(health) == OK else Markdown("{}: ").format(ILL)
+    return Markdown("**{}**: {}{}").format(process_name(member), ill, detail(health))
