@@ -6,6 +6,7 @@ from hmcs.bus.messages import (
     MESSAGES,
     ActivateRecognizer,
     Ask,
+    ChangeRecording,
     Command,
     Description,
     Done,
@@ -32,7 +33,7 @@ from hmcs.bus.qos import QOS_PROFILES, QosProfile
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
     ModelQuestion, ModelFile, ActivateRecognizer, RobotDescription, Record, Train, OutlineQuestion,
-    Outline, SetLabels, Done,
+    Outline, SetLabels, ChangeRecording, Done,
 }  # fmt: skip
 
 

@@ -66,7 +66,7 @@ class View:
         server, model = self.page.server, self._followed(picture)
         with server.atomic():
             self._scene.draw(picture, model)
-            self._path.draw(picture.take, picture.states)
+            self._path.draw(picture.take, picture.states, time.monotonic())
         if picture.robot is not None:
             self.page.lead_handles(picture.robot.tool_position, picture.operating_client)
         now_s = time.monotonic()

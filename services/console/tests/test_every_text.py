@@ -130,7 +130,7 @@ KEPT: Mapping[type[Message], Keep] = {
 NOT_SHOWN = {
     *("Motion", "Step", "Command", "Handle", "Ask", "Description", "SettingsReport"),
     *("LastStepsQuestion", "LastSteps", "LoadModel", "ActivateRecognizer", "Record", "Train"),
-    *("OutlineQuestion", "SetLabels", "Pairing", "StopRequest"),
+    *("OutlineQuestion", "SetLabels", "ChangeRecording", "Pairing", "StopRequest"),
 }
 """What the page says, or has no use for."""
 READ = {

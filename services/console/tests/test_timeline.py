@@ -11,7 +11,7 @@ import pytest
 import viser
 from numpy.testing import assert_allclose
 
-from hmcs.bus.messages import Done, Outline, OutlineQuestion, SetLabels
+from hmcs.bus.messages import ChangeRecording, Done, Outline, OutlineQuestion, SetLabels
 from hmcs.bus.session import RequestRefusedError
 from hmcs.recordings.stretches import LabelError
 from hmcs_console.seeing.takes import (
@@ -21,6 +21,7 @@ from hmcs_console.seeing.takes import (
     labeled,
     lines,
     opened,
+    played_at,
     saved,
     saving,
     states_of,
@@ -87,6 +88,18 @@ def test_the_way_is_colored_by_its_labels_and_begins_where_it_is_laid() -> None:
     assert tuple(colors[0, 0]) == color_of("free", STATES)
     assert tuple(colors[-1, 1]) == UNKNOWN
     assert_allclose(chosen[:, 0, 0], np.arange(0.8, 0.9, 0.01), atol=1e-6)
+
+
+def test_while_a_recording_is_played_a_ball_is_where_the_hand_was() -> None:
+    shown, origin = take(playing_since_s=100.0), np.array([0.6, 0.0, 0.4])
+    begin, later = (played_at(shown, origin, at_s) for at_s in (100.0, 102.0))
+    assert begin is not None
+    assert later is not None
+    assert_allclose(begin, origin)
+    way = shown.position[np.searchsorted(shown.time_s, shown.time_s[0] + 2.0)]
+    assert_allclose(later, way - shown.position[0] + origin, atol=0.02)
+    assert played_at(shown, origin, 1000.0) is None
+    assert played_at(shown._replace(playing_since_s=None), origin, 100.0) is None
 
 
 def test_labels_that_are_no_states_of_the_task_are_offered_and_drawn() -> None:
@@ -162,12 +175,18 @@ class Recorder:
         self.asked: list[SetLabels] = []
         bus.answer("outline", OutlineQuestion, self.outline)
         bus.answer("set_labels", SetLabels, self.set_labels)
+        bus.answer("change_recording", ChangeRecording, self.change)
+        self.changes: list[ChangeRecording] = []
         bus.announce(bus.keys.presence("recorder", "x"))
 
     def outline(self, asked: OutlineQuestion) -> Outline:
         if asked.recording == "gone.mcap":
             raise RequestRefusedError("there is no recording 'gone.mcap'")
         return outline(recording=asked.recording or "two.mcap")
+
+    def change(self, asked: ChangeRecording) -> Done:
+        self.changes.append(asked)
+        return Done(detail="changed")
 
     def set_labels(self, asked: SetLabels) -> Done:
         if asked.recording == "one.mcap":
@@ -211,6 +230,24 @@ def test_what_a_recorder_refuses_is_said_and_nothing_is_lost(cell: Any) -> None:
     assert [label.state for label in recordings.take.labels] == ["in"]
 
 
+def test_a_recording_is_renamed_noted_and_deleted_on_the_page(cell: Any) -> None:
+    recordings = cell.service.recordings
+    recordings.open("one.mcap")
+    cell.until(lambda: recordings.take.name == "one.mcap", "the recording")
+    recordings.label("in")
+    recordings.note("slower")
+    cell.until(lambda: recordings.take.note == "slower", "the note")
+    assert recordings.take.name == "one.mcap"
+    recordings.rename("slow")
+    cell.until(lambda: not recordings.take.name, "nothing to be shown")
+    assert recordings.take.said == "changed"
+    assert "one.mcap" not in recordings.take.unsaved
+    assert [(asked.change, asked.text) for asked in cell.recorder.changes] == [
+        ("note", "slower"),
+        ("rename", "slow"),
+    ]
+
+
 def test_without_a_recorder_the_page_says_what_is_missing(make_cell: Callable[..., Any]) -> None:
     cell = make_cell()
     recordings = cell.service.recordings
@@ -223,13 +260,16 @@ def test_without_a_recorder_the_page_says_what_is_missing(make_cell: Callable[..
 # --- the controls ---------------------------------------------------------------------------------
 
 
+MANAGING = ("play", "rename", "delete", "note")
+
+
 class Asked(SimpleNamespace):
     """Whoever is asked for things by the controls."""
 
     def __init__(self) -> None:
         super().__init__()
         self.said: list[tuple[Any, ...]] = []
-        for verb in ("open", "refresh", "hide", "choose", "label", "remove", "save"):
+        for verb in ("open", "refresh", "hide", "choose", "label", "remove", "save", *MANAGING):
             setattr(self, verb, lambda *words, verb=verb: self.said.append((verb, *words)))
 
 
@@ -247,7 +287,7 @@ def test_drawing_asks_for_nothing_by_itself(server: Any) -> None:
     shown = take()
     for drawn in (shown, labeled(shown, "in"), hidden(shown), shown._replace(chosen_s=(1.0, 2.0))):
         timeline.draw(drawn, STATES)
-        path.draw(drawn, STATES)
+        path.draw(drawn, STATES, 0.0)
     assert asked.said == []
 
 
@@ -257,7 +297,7 @@ def test_controls_are_there_only_while_a_recording_is_shown(server: Any) -> None
 
     def draw(shown: Take) -> tuple[bool, bool]:
         timeline.draw(shown, STATES)
-        path.draw(shown, STATES)
+        path.draw(shown, STATES, 0.0)
         return timeline._shown.visible, path._path.visible
 
     assert draw(Take()) == (False, False)
@@ -266,6 +306,22 @@ def test_controls_are_there_only_while_a_recording_is_shown(server: Any) -> None
     assert timeline._state.offered == STATES
     assert draw(hidden(take())) == (False, False)
     assert timeline._choice.chosen == ""
+
+
+def test_a_recording_is_deleted_at_the_second_press_and_of_that_recording_only(
+    server: Any,
+) -> None:
+    asked = Asked()
+    timeline = Timeline(server.gui, asked, lambda _: None)
+    timeline.draw(take(), STATES)
+    timeline._ask_to_delete()
+    assert timeline._delete.label == "Delete two.mcap for ever"
+    timeline.draw(opened(Take(), outline(recording="one.mcap")), STATES)
+    assert timeline._delete.label == "Delete"
+    timeline._ask_to_delete()
+    assert asked.said == []
+    timeline._ask_to_delete()
+    assert asked.said == [("delete",)]
 
 
 def test_the_slider_is_as_long_as_the_recording(server: Any) -> None:

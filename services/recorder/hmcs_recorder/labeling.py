@@ -11,6 +11,7 @@ from hmcs.bus.session import RequestRefusedError
 from hmcs.errors import first_problem
 from hmcs.recordings.outlining import outlined, recording_named, recordings_in, set_labels
 from hmcs.recordings.reading import RecordingContent, read
+from hmcs_recorder.changing import note_of
 from hmcs_recorder.settings import RecorderSettings
 
 _MB = 1_000_000
@@ -35,6 +36,7 @@ def outline_of(settings: RecorderSettings, asked: OutlineQuestion) -> Outline:
             begin_s=outline.begin_s,
             end_s=outline.end_s,
             states=outline.states,
+            note=note_of(path),
         )
     except ValidationError as error:
         where, why = first_problem(error)

@@ -19,6 +19,7 @@ from hmcs.bus.keys import check_name
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.mailbox import Arrival
 from hmcs.bus.messages import (
+    ChangeRecording,
     Done,
     Envelope,
     LastStepsQuestion,
@@ -29,13 +30,14 @@ from hmcs.bus.messages import (
 )
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, RequestRefusedError
-from hmcs.bus.verbs import LAST_STEPS, OUTLINE, RECORD, SET_LABELS
+from hmcs.bus.verbs import CHANGE_RECORDING, LAST_STEPS, OUTLINE, RECORD, SET_LABELS
 from hmcs.bus.wire import encode
 from hmcs.errors import UserError
 from hmcs.recordings.file_rotation import Limits, Preface, Recording
 from hmcs.recordings.json_codec import Fields, fields_of
 from hmcs.recordings.label_files import has_fingerprint
 from hmcs.recordings.labels import labels_beside
+from hmcs_recorder.changing import changed
 from hmcs_recorder.labeling import labels_set, outline_of
 from hmcs_recorder.prefacing import ask_all, joined, preface_of
 from hmcs_recorder.robots import Robots
@@ -77,6 +79,7 @@ class Recorder(Service):
         RECORD.answer(self.bus, self._asked)
         OUTLINE.answer(self.bus, self._outline, aside=self._reading)
         SET_LABELS.answer(self.bus, self._set_labels, aside=self._reading)
+        CHANGE_RECORDING.answer(self.bus, self._change, aside=self._reading)
         self.bus.listen(self.bus.keys.everything, self._on_arrival)
         if self.settings.autostart:
             self._begin("")
@@ -110,6 +113,10 @@ class Recorder(Service):
 
     def _set_labels(self, asked: SetLabels) -> Done:
         return labels_set(self.settings, asked)
+
+    def _change(self, asked: ChangeRecording) -> Done:
+        recording = self._recording
+        return changed(self.settings, asked, None if recording is None else recording.path)
 
     def _asked(self, asked: Record) -> Done:
         if not asked.on:

@@ -14,6 +14,7 @@ from hmcs.bus.messages import (
     ActivateRecognizer,
     Ask,
     Belief,
+    ChangeRecording,
     Command,
     Description,
     Done,
@@ -89,6 +90,7 @@ BOUNDS: dict[type[Message], Bound] = {
     Train: Bound(256 * KIB, 4096, "The paths of 1000 demonstrations."),
     OutlineQuestion: Bound(2 * KIB, 64, "One name."),
     Outline: Bound(16 * MIB, 100_000, "A path of 100 000 points, and the names of all recordings."),
+    ChangeRecording: Bound(16 * KIB, 64, "Two names, or a name and a note."),
     SetLabels: Bound(MIB, 20_000, "Labels of a long recording, two numbers and a name each."),
     Done: Bound(64 * KIB, 64, "A sentence."),
 }  # fmt: skip

@@ -8,6 +8,7 @@ from hmcs.bus.messages import (
     ActivateRecognizer,
     Ask,
     Belief,
+    ChangeRecording,
     Command,
     Description,
     Done,
@@ -207,6 +208,7 @@ EXAMPLES: tuple[Message, ...] = (
         begin_s=np.array([0.25]),
         end_s=np.array([0.5]),
         states=("follow",),
+        note="slower than usual",
     ),
     SetLabels(
         recording="take-1.mcap",
@@ -214,6 +216,7 @@ EXAMPLES: tuple[Message, ...] = (
         end_s=np.array([0.5, 1.0]),
         states=("follow", "return"),
     ),
+    ChangeRecording(recording="take-1.mcap", change="rename", text="slow-1"),
     Done(detail="following demo"),
 )
 """One of each, every optional field filled."""

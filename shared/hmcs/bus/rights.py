@@ -17,6 +17,7 @@ from hmcs.bus.keys import ANY, Keys
 from hmcs.bus.verbs import (
     ACTIVATE,
     CANCEL,
+    CHANGE_RECORDING,
     DESCRIBE,
     HEALTH,
     LAST_STEPS,
@@ -211,6 +212,7 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
                 ("recorder", RECORD),
                 ("recorder", OUTLINE),
                 ("recorder", SET_LABELS),
+                ("recorder", CHANGE_RECORDING),
                 ("trainer", TRAIN),
                 ("trainer", CANCEL),
             ),

@@ -15,6 +15,7 @@ from hmcs.bus.keys import ANY
 from hmcs.bus.messages import (
     ActivateRecognizer,
     Ask,
+    ChangeRecording,
     Description,
     Done,
     Health,
@@ -98,6 +99,13 @@ STOP = Verb("stop", ("robot",), Ask, Done, "stands until the operator lets go an
 RECORD = Verb("record", ("recorder",), Record, Done, "begins or ends a recording")
 OUTLINE = Verb("outline", ("recorder",), OutlineQuestion, Outline, "the motion in a recording")
 SET_LABELS = Verb("set_labels", ("recorder",), SetLabels, Done, "writes labels for a recording")
+CHANGE_RECORDING = Verb(
+    "change_recording",
+    ("recorder",),
+    ChangeRecording,
+    Done,
+    "renames or deletes a recording, or notes something about it",
+)
 TRAIN = Verb("train", ("trainer",), Train, Done, "learns a model")
 CANCEL = Verb("cancel", ("trainer",), Ask, Done, "ends the training that runs")
 
@@ -115,6 +123,7 @@ VERBS: tuple[Verb, ...] = (  # type: ignore[type-arg]
     RECORD,
     OUTLINE,
     SET_LABELS,
+    CHANGE_RECORDING,
     TRAIN,
     CANCEL,
 )

@@ -54,6 +54,10 @@ class Take(NamedTuple):
     """From where to where the next label is to be set."""
     unsaved: Mapping[str, tuple[Stretch, ...]] = MappingProxyType({})
     """Labels that were set and not saved, by recording."""
+    note: str = ""
+    """What somebody wrote down about it."""
+    playing_since_s: float | None = None
+    """When its playing in the scene began, monotonic; None while it is not played."""
     said: str = ""
     """What came of the last thing that was done."""
 
@@ -79,6 +83,8 @@ def opened(take: Take, outline: Outline) -> Take:
         duration_s=outline.duration_s,
         time_s=outline.time_s,
         position=outline.position,
+        note=outline.note,
+        playing_since_s=take.playing_since_s if again else None,
         labels=take.unsaved.get(outline.recording, labels),
         chosen_s=_within(take.chosen_s, outline.duration_s) if again else (0.0, outline.duration_s),
         said="" if len(outline.time_s) else "no motion of a hand that held on is in it",
@@ -169,6 +175,20 @@ def lines(take: Take, states: Sequence[str], origin: Array) -> tuple[Pieces, Pie
     begin_s, end_s = take.chosen_s
     chosen = (middle >= begin_s) & (middle < end_s)
     return Pieces(pieces, both), Pieces(pieces[chosen], both[chosen])
+
+
+def played_at(take: Take, origin: Array, now_s: float) -> Array | None:
+    """Return where the hand is in the scene while the recording is played, m, shape (3,).
+
+    It is laid as `lines` lays it; None where it is not played, or has been to its end.
+    """
+    if take.playing_since_s is None or len(take.time_s) < 2:
+        return None
+    at_s = now_s - take.playing_since_s + take.time_s[0]
+    if not 0.0 <= at_s <= take.time_s[-1]:
+        return None
+    place = [np.interp(at_s, take.time_s, axis) for axis in take.position.T]
+    return np.asarray(np.array(place) - take.position[0] + origin)
 
 
 def band_color(state: str, states: Sequence[str]) -> Color:

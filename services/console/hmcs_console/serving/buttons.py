@@ -26,6 +26,7 @@ TAG, TRAIN, REFRESH, SAVE, ADD, HIDE, REMOVE = (
     viser.Icon.EYE_OFF,
     viser.Icon.ERASER,
 )
+EDIT, DELETE = viser.Icon.PENCIL, viser.Icon.TRASH
 HAND = viser.Icon.HAND_GRAB
 
 

@@ -50,6 +50,11 @@ def name_button(button: viser.GuiButtonHandle, text: str) -> None:
         button.label = shown
 
 
+def fill(field: viser.GuiInputHandle[str], text: str) -> None:
+    """Write into a field that viewers may change."""
+    field.value = plain(text)  # type: ignore[misc]
+
+
 def notify(viewer: viser.ClientHandle, text: str, seconds: float) -> None:
     """Tell one viewer something, for a while."""
     viewer.add_notification(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from typing import Literal
 
 from hmcs.bus.keys import Keys, Member
-from hmcs.bus.messages import Outline, OutlineQuestion
+from hmcs.bus.messages import ChangeRecording, Outline, OutlineQuestion
 from hmcs.bus.session import Answer
-from hmcs.bus.verbs import OUTLINE, SET_LABELS
+from hmcs.bus.verbs import CHANGE_RECORDING, OUTLINE, SET_LABELS
 from hmcs.errors import UserError
 from hmcs_console.asking import Asking
 from hmcs_console.seeing import takes
@@ -62,6 +64,26 @@ class Recordings:
         """Take labels away from the chosen stretch."""
         self._put(lambda: self._edit(takes.unlabeled))
 
+    def play(self) -> None:
+        """Show in the scene how the hand moved, at its own speed."""
+
+        def begin() -> None:
+            self._edit(lambda take: take._replace(playing_since_s=time.monotonic()))
+
+        self._put(begin)
+
+    def rename(self, name: str) -> None:
+        """Have the recorder call the recording that is shown something else."""
+        self._put(lambda: self._change("rename", name))
+
+    def delete(self) -> None:
+        """Have the recorder delete the recording that is shown, with what is beside it."""
+        self._put(lambda: self._change("delete", ""))
+
+    def note(self, text: str) -> None:
+        """Have the recorder write down a note about the recording that is shown."""
+        self._put(lambda: self._change("note", text))
+
     def save(self) -> None:
         """Have the recorder write the labels down."""
         self._put(self._save)
@@ -78,7 +100,10 @@ class Recordings:
             for answer in answers[:1]:
                 self.take = self.take._replace(recordings=answer.body.recordings)
 
-        self._asking.ask(OUTLINE, member, OutlineQuestion(), come, timeout_s=READ_S)
+        def none(_: str) -> None:
+            self.take = self.take._replace(recordings=())
+
+        self._asking.ask(OUTLINE, member, OutlineQuestion(), come, none, timeout_s=READ_S)
 
     def _show(self, take: Take) -> None:
         self.take = take
@@ -118,6 +143,31 @@ class Recordings:
             come,
             lambda reason: self._say(f"the recorder refused: {reason}"),
             timeout_s=READ_S,
+        )
+
+    def _change(self, change: Literal["rename", "delete", "note"], text: str) -> None:
+        member, name = self._recorder(), self.take.name
+        if not name or member is None:
+            self._say("open a recording first" if member else "no recorder is there: start one")
+            return
+
+        def done(said: str) -> None:
+            if change == "note":
+                self._show(self.take._replace(note=text, said=said))
+                return
+            if self.take.name == name:
+                self._hide()
+            unsaved = {each: labels for each, labels in self.take.unsaved.items() if each != name}
+            self._show(self.take._replace(unsaved=unsaved))
+            self._say(said)
+            self.list()
+
+        self._asking.request(
+            member,
+            CHANGE_RECORDING,
+            ChangeRecording(recording=name, change=change, text=text),
+            done,
+            self._say,
         )
 
     def _edit(self, edit: Callable[[Take], Take]) -> None:

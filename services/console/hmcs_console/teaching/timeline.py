@@ -13,9 +13,12 @@ from viser import uplot
 
 from hmcs.shown import Markdown
 from hmcs_console.seeing.history import limits
-from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, states_of
+from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, played_at, states_of
 from hmcs_console.serving.buttons import (
     ADD,
+    DELETE,
+    EDIT,
+    GO,
     HIDE,
     PLAIN,
     REFRESH,
@@ -25,7 +28,7 @@ from hmcs_console.serving.buttons import (
     on_change,
     on_click,
 )
-from hmcs_console.serving.writing import Choice, add_words, name_of_curve, write
+from hmcs_console.serving.writing import Choice, add_words, fill, name_button, name_of_curve, write
 from hmcs_console.shapes.palette import FASTER, css
 from hmcs_console.shapes.pieces import add_pieces, draw_pieces
 from hmcs_console.telling.plots import with_room
@@ -33,7 +36,7 @@ from hmcs_console.telling.plots import with_room
 _HEIGHT_PX = 210
 _SLIDER_STEPS = 1000
 _TRANSPARENT = "66"
-_PATH_M, _CHOSEN_M = 0.004, 0.012
+_PATH_M, _CHOSEN_M, _HAND_M = 0.004, 0.012, 0.015
 
 
 class Editing(Protocol):
@@ -59,6 +62,18 @@ class Editing(Protocol):
 
     def save(self) -> None:
         """Have the labels written down."""
+
+    def play(self) -> None:
+        """Show in the scene how the hand moved."""
+
+    def rename(self, name: str) -> None:
+        """Call the recording something else."""
+
+    def delete(self) -> None:
+        """Delete the recording, with what is beside it."""
+
+    def note(self, text: str) -> None:
+        """Write down a note about the recording."""
 
 
 class Timeline:
@@ -101,8 +116,35 @@ class Timeline:
             on_click(save, editing.save)
             use = gui.add_button("Use for training", order=14.0, color=PLAIN, icon=ADD)
             on_click(use, lambda: use_for_training(self._drawn[0].path))
+            play = gui.add_button("Play", order=14.5, color=PLAIN, icon=GO)
+            on_click(play, editing.play)
             on_click(gui.add_button("Hide", order=15.0, color=PLAIN, icon=HIDE), editing.hide)
+        self._files = gui.add_folder("File", visible=False, expand_by_default=False)
+        with self._files:
+            self._note = gui.add_text("Note", "", order=20.0)
+            keep = gui.add_button("Save note", order=21.0, color=PLAIN, icon=SAVE)
+            on_click(keep, lambda: editing.note(self._note.value))
+            name = gui.add_text("New name", "", order=22.0)
+            rename = gui.add_button("Rename", order=23.0, color=PLAIN, icon=EDIT)
+            on_click(rename, lambda: editing.rename(name.value))
+            self._delete = gui.add_button("Delete", order=24.0, color="red", icon=DELETE)
+            on_click(self._delete, self._ask_to_delete)
+        self._to_delete = ""
         self._said = add_words(gui)
+
+    def _ask_to_delete(self) -> None:
+        """Delete at the second press, after the button has named what would be gone."""
+        name = self._drawn[0].name
+        if name and self._to_delete == name:
+            self._to_delete = ""
+            self._editing.delete()
+        else:
+            self._to_delete = name
+        self._name_delete()
+
+    def _name_delete(self) -> None:
+        asked = f"Delete {self._to_delete} for ever" if self._to_delete else "Delete"
+        name_button(self._delete, asked)
 
     def draw(self, take: Take, states: tuple[str, ...]) -> None:
         """Draw what is shown of a recording, with the states of the task."""
@@ -113,7 +155,12 @@ class Timeline:
         write(self._said, take.said)
         self._choice.offer(take.recordings, none_too=not take.name)
         self._choice.choose(take.name)
-        self._shown.visible = bool(take.name)
+        self._shown.visible = self._files.visible = bool(take.name)
+        if take.name != before.name:
+            self._to_delete = ""
+            self._name_delete()
+        if (take.name, take.note) != (before.name, before.note):
+            fill(self._note, take.note)
         if not take.name:
             return
         named = states_of(take, states)
@@ -199,10 +246,21 @@ class TakePath:
         self._origin = origin
         self._path = add_pieces(scene, "/recording/path", _PATH_M)
         self._chosen = add_pieces(scene, "/recording/chosen", _CHOSEN_M)
+        self._hand = scene.add_icosphere(
+            "/recording/hand", radius=_HAND_M, color=CHOSEN, visible=False
+        )
         self._drawn: tuple[Take, tuple[str, ...]] = (Take(), ())
 
-    def draw(self, take: Take, states: tuple[str, ...]) -> None:
-        """Draw what is shown of a recording, colored by its labels; what is chosen is thicker."""
+    def draw(self, take: Take, states: tuple[str, ...], now_s: float) -> None:
+        """Draw what is shown of a recording, colored by its labels; what is chosen is thicker.
+
+        While it is played a ball moves as the hand did, by the monotonic clock.
+        """
+        place = played_at(take, self._origin, now_s)
+        if self._hand.visible != (place is not None):
+            self._hand.visible = place is not None
+        if place is not None:
+            self._hand.position = place
         before, states_before = self._drawn
         if take is before and states == states_before:
             return

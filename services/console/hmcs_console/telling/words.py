@@ -132,7 +132,8 @@ def training(progress: TrainingProgress | None) -> Markdown:
     if progress is None:
         return Markdown("No training was heard of.")
     text = Markdown("**{}** {}: {}").format(progress.model, progress.stage, progress.detail)
-    return _LINES.join([text, progress.path]) if progress.path else text
+    report = Markdown("report: {}").format(progress.report) if progress.report else Markdown("")
+    return _LINES.join([line for line in (text, progress.path, report) if line])
 
 
 def marking(now: Marking) -> Markdown:

@@ -27,7 +27,14 @@ from hmcs.bus.messages.recognition import (
     ModelFile,
     ModelQuestion,
 )
-from hmcs.bus.messages.recording import Label, Outline, OutlineQuestion, Record, SetLabels
+from hmcs.bus.messages.recording import (
+    ChangeRecording,
+    Label,
+    Outline,
+    OutlineQuestion,
+    Record,
+    SetLabels,
+)
 from hmcs.bus.messages.robot import RobotDescription, RobotState, StopRequest
 from hmcs.bus.messages.steps import LastSteps, LastStepsQuestion, Step
 from hmcs.bus.messages.training import Train, TrainingProgress
@@ -37,6 +44,7 @@ __all__ = [
     "ActivateRecognizer",
     "Ask",
     "Belief",
+    "ChangeRecording",
     "Command",
     "Description",
     "Done",
@@ -100,6 +108,7 @@ MESSAGES: tuple[type[Message], ...] = (
     OutlineQuestion,
     Outline,
     SetLabels,
+    ChangeRecording,
     Done,
 )
 """Every message there is, for schemas, golden bytes and tables."""

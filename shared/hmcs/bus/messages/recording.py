@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -48,6 +48,7 @@ class Outline(Message):
     """The motion in a recording, and which part of the task it was."""
 
     SCHEMA = "outline"
+    VERSION = 2
 
     recordings: tuple[str, ...]
     """Names of all files in the folder, the newest first."""
@@ -67,6 +68,8 @@ class Outline(Message):
     """Where it ends, shape (m,)."""
     states: tuple[str, ...]
     """What it says, as in Label, m of them."""
+    note: str = ""
+    """What somebody wrote down about the recording."""
 
 
 class SetLabels(Message):
@@ -82,3 +85,16 @@ class SetLabels(Message):
     """Where it ends, shape (m,)."""
     states: tuple[str, ...]
     """What it says, as in Label, m of them."""
+
+
+class ChangeRecording(Message):
+    """Asks the recorder to rename a recording, to delete it, or to note something about it."""
+
+    SCHEMA = "change_recording"
+
+    recording: str
+    """Name of the file, without folder."""
+    change: Literal["rename", "delete", "note"]
+    """What to do: its labels and its note go along."""
+    text: str = ""
+    """The new name, without folder and ending, or the note; an empty note takes it away."""
