@@ -34,6 +34,7 @@ from hmcs.bus.verbs import CHANGE_RECORDING, LAST_STEPS, OUTLINE, RECORD, SET_LA
 from hmcs.bus.wire import encode
 from hmcs.errors import UserError
 from hmcs.recordings.file_rotation import Limits, Preface, Recording
+from hmcs.recordings.foxglove_layout import LAYOUT_NAME, foxglove_layout
 from hmcs.recordings.json_codec import Fields, fields_of
 from hmcs.recordings.label_files import has_fingerprint
 from hmcs.recordings.labels import labels_beside
@@ -291,7 +292,9 @@ class Recorder(Service):
 
     def _preface(self) -> Preface:
         self._robots.ask()
-        return joined(preface_of(self.bus, self.settings.models, self.log), *self._robots.kept())
+        layout = Preface({}, {LAYOUT_NAME: foxglove_layout()})
+        about = preface_of(self.bus, self.settings.models, self.log)
+        return joined(about, layout, *self._robots.kept())
 
 
 def _of_labels_there(recording: Path) -> str:

@@ -10,10 +10,17 @@ import pytest
 from mcap.reader import make_reader
 
 from hmcs.bus.messages import Ask, RobotDescription, RobotState
-from hmcs.recordings.reading import read
+from hmcs.recordings.foxglove_layout import LAYOUT_NAME, foxglove_layout
+from hmcs.recordings.reading import RecordingContent, read
 from hmcs_recorder import robots
 from support.recorder import Bench, denied, pumped
 from support.stack import Stack
+
+
+def models_in(content: RecordingContent) -> dict[str, bytes]:
+    """The models that are attached, without what else is."""
+    attached = content.attachments
+    return {name: attached[name] for name in attached if name.endswith(".hmcs")}
 
 
 @pytest.mark.long
@@ -28,7 +35,8 @@ def test_who_was_there_and_the_models_are_kept_with_a_recording(
     bench = Bench(stack, tmp_path / "recordings", models=(model.parent,))
     bench.service.close()
     content = bench.content()
-    assert content.attachments == {"mine.hmcs": b"a model"}
+    assert models_in(content) == {"mine.hmcs": b"a model"}
+    assert content.attachments[LAYOUT_NAME] == foxglove_layout()
     device = content.metadata["input_device/device"]
     assert device["task"] == "human-shapes"
     assert "dead_zone_m" in device["settings"]
@@ -54,7 +62,7 @@ def test_models_that_cannot_be_read_are_left_out_and_two_of_a_name_distinguished
     bench = Bench(stack, tmp_path / "recordings", models=(*places, tmp_path / "none"))
     bench.service.close()
     monkeypatch.undo()
-    assert bench.content().attachments == {"mine.hmcs": b"one", "mine-2.hmcs": b"two"}
+    assert models_in(bench.content()) == {"mine.hmcs": b"one", "mine-2.hmcs": b"two"}
 
 
 class Robot:

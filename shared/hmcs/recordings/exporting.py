@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hmcs.recordings.foxglove_layout import LAYOUT_NAME
 from hmcs.recordings.json_codec import NoMessageError
 from hmcs.recordings.reading import Recorded, RecordingContent, RecordingError
 from hmcs.whole_files import written_whole
@@ -35,6 +36,7 @@ MOST_FILES = 64
 """Written at a time; systems admit some hundred open ones."""
 LONGEST_NAME = 100
 """Characters of a file's name ahead of its number and ending; file systems have 255 bytes."""
+_ROBOT = ".urdf"
 _ENVELOPE = ("schema",)
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]")
 _LARGEST_NUMBER = 1e308
@@ -60,7 +62,8 @@ def export(content: RecordingContent, folder: Path, form: Format) -> list[Path]:
 
     Each row is a message: `time_s` since the first message, then its fields, arrays spread over
     columns `name_0`, `name_1`, …. Where an array's length changes, missing places are empty in CSV
-    and NaN in NumPy files. Messages that are no JSON are left out. Raises RecordingError where a
+    and NaN in NumPy files. The robots' descriptions and the layout for Foxglove that are attached
+    are written beside them. Messages that are no JSON are left out. Raises RecordingError where a
     table would be too large, and OSError as writing does; files are there whole or not at all.
     """
     tables = _tables(content)
@@ -77,7 +80,21 @@ def export(content: RecordingContent, folder: Path, form: Format) -> list[Path]:
     else:
         for key, file in files.items():
             _write_arrays(content, key, file, tables[key])
-    return list(files.values())
+    return [*files.values(), *_for_viewers(content, folder)]
+
+
+def _for_viewers(content: RecordingContent, folder: Path) -> Iterator[Path]:
+    """Write what is attached for viewers, which read no attachments; yield which files."""
+    wanted = [name for name in content.attachments if _is_for_viewers(name)]
+    for name in sorted(wanted):
+        file = folder / _NOT_IN_NAMES.sub("_", name)[-LONGEST_NAME:]
+        with written_whole(file) as unfinished:
+            unfinished.write_bytes(content.attachments[name])
+        yield file
+
+
+def _is_for_viewers(name: str) -> bool:
+    return name == LAYOUT_NAME or name.endswith(_ROBOT)
 
 
 def _tables(content: RecordingContent) -> dict[str, _Table]:

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hmcs.bus.messages import Motion
+from hmcs.bus.examples import ENVELOPE, EXAMPLES
+from hmcs.bus.messages import Motion, RobotState
+from hmcs.bus.wire import encode
 from hmcs.recordings import exporting
 from hmcs.recordings.exporting import Format, export
+from hmcs.recordings.file_rotation import Preface
+from hmcs.recordings.foxglove import FoxgloveConverter
+from hmcs.recordings.foxglove_layout import LAYOUT_NAME, foxglove_layout
 from hmcs.recordings.inspection import inspected
+from hmcs.recordings.json_codec import fields_of
 from hmcs.recordings.reading import RecordingError, read
 from support.recordings import KEYS, Maker, Said
 
@@ -35,6 +42,36 @@ def test_tables_and_arrays_hold_every_message(
         np.testing.assert_array_equal(arrays["position_1"], [m.position[1] for m in motions])
         np.testing.assert_array_equal(arrays["dead_man"], [m.dead_man for m in motions])
         assert arrays["source_service"][0] == "input_device"
+
+
+def test_what_is_attached_for_viewers_is_written_beside_the_tables_and_nowhere_else(
+    maker: Maker, tmp_path: Path
+) -> None:
+    recording = maker.begin()
+    attached = {"../arm.urdf": b"<robot/>", LAYOUT_NAME: foxglove_layout(), "mine.hmcs": b"model"}
+    recording.add(Preface({}, attached), 10**18)
+    recording.finish()
+    folder = tmp_path / "tables"
+    written = export(read(recording.path), folder, "csv")
+    assert {file.name for file in written} == {".._arm.urdf", LAYOUT_NAME}
+    assert set(written) == set(folder.iterdir())
+    assert (folder / ".._arm.urdf").read_bytes() == b"<robot/>"
+
+
+def test_the_layout_shows_only_topics_that_recordings_have() -> None:
+    shown = json.loads(foxglove_layout())
+    panels = shown["configById"]
+    assert {shown["layout"]["first"], shown["layout"]["second"]} == set(panels)
+    (plotted,) = (path["value"] for path in panels[shown["layout"]["second"]]["paths"])
+    topics = {*panels[shown["layout"]["first"]]["topics"], plotted.partition(".")[0]}
+    robot, motion = (
+        fields_of(encode(body, ENVELOPE))
+        for body in EXAMPLES
+        if isinstance(body, RobotState | Motion)
+    )
+    converter = FoxgloveConverter()
+    told = {each.topic for fields in (robot, motion) for each in converter.of(fields, 10**18)}
+    assert topics == told
 
 
 @pytest.mark.parametrize("form", ["csv", "npz"])
