@@ -48,7 +48,8 @@ name and version. Arrays travel as maps `{"dtype": "<f8", "shape": [3], "data": 
 little-endian, in C order. Unknown fields are ignored on reading; missing, mistyped, misshapen,
 non-finite or absurdly large ones are refused and counted, and so is a message larger than its
 bound, before it is decoded. A change that breaks readers raises the version, and
-`tests/contract/` holds the JSON Schema and golden bytes of every version there ever was.
+`tests/contract/` holds the JSON Schema and golden bytes of every version there ever was. Where
+this package is installed, `python -m hmcs.bus.schemas DIR` writes those of its version.
 
 SI units; frames are right-handed, x forward, z up; quaternions x y z w; twists and wrenches linear
 part first; poses in the robot's base frame unless a field says otherwise; times in nanoseconds.
