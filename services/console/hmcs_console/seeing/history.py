@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 LONGEST_ROWS = 300
 EVERY_S = 0.1
 """How often a row is written down."""
+_ROOM = 0.08
+"""Above a plot's highest tick, of its height."""
 _SMALLEST, _LARGEST = 1e-3, 1e9
 """Of a plot's limits: ticks have three digits after the point, and smaller ones would read 0."""
 SPAN_S = LONGEST_ROWS * EVERY_S
@@ -52,6 +54,12 @@ def limits(columns: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
     lower, upper = float(values.min()), float(values.max())
     rounded = -_round_up(-lower), _round_up(upper)
     return (0.0, 1.0) if rounded[0] == rounded[1] else rounded
+
+
+def with_room(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return limits with room for the whole label of the highest tick."""
+    lower, upper = limits
+    return lower, upper + _ROOM * (upper - lower)
 
 
 def _round_up(value: float) -> float:

@@ -18,6 +18,7 @@ _STYLE = """
 /* Tabs keep their places whichever of them is open. */
 [data-dock-area] [data-dock-strip][role=tablist], .mantine-Tabs-list {
   display: grid !important; grid-template-columns: repeat(4, auto);
+  justify-content: stretch !important;
 }
 [data-dock-area] [data-dock-strip] > [role=tab], .mantine-Tabs-tab {
   font-weight: 500 !important; justify-content: center; padding: 0 0.2em !important;
@@ -31,7 +32,10 @@ label {
 .multi-slider-mark-wrapper:last-of-type .multi-slider-mark-label { right: 0; }
 /* The legend names curves; the axis names the time. */
 .u-legend .u-series:first-child { display: none; }
-table th, table td { padding: 0.2em 0.45em !important; text-align: left; vertical-align: top; }
+.mantine-Table-table { font-size: 12px !important; }
+.mantine-Table-table th, .mantine-Table-table td {
+  padding: 0.2em 0.5em !important; text-align: left; vertical-align: top; overflow-wrap: anywhere;
+}
 /* On a telephone the panel lies below the arm. */
 @media (max-width: 36em) {
   .mantine-Paper-root[style*="fixed"][style*="bottom: 0"] {

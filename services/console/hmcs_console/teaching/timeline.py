@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from hmcs.shown import Markdown
-from hmcs_console.seeing.history import limits
+from hmcs_console.seeing.history import limits, with_room
 from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, played_at, states_of
 from hmcs_console.serving.buttons import (
     ADD,
@@ -31,7 +31,6 @@ from hmcs_console.serving.buttons import (
 from hmcs_console.serving.writing import Choice, add_words, fill, name_button, name_of_curve, write
 from hmcs_console.shapes.palette import FASTER, css
 from hmcs_console.shapes.pieces import add_pieces, draw_pieces
-from hmcs_console.telling.plots import with_room
 
 _HEIGHT_PX = 210
 _SLIDER_STEPS = 1000

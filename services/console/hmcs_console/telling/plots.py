@@ -8,7 +8,7 @@ from typing import NamedTuple
 import viser
 from viser import uplot
 
-from hmcs_console.seeing.history import SPAN_S, Rows, columns, limits
+from hmcs_console.seeing.history import SPAN_S, Rows, columns, limits, with_room
 from hmcs_console.seeing.hops import FAST, SLOW, hop_names
 from hmcs_console.serving.writing import name_of_curve
 from hmcs_console.shapes.palette import (
@@ -24,7 +24,6 @@ from hmcs_console.shapes.palette import (
 
 _HEIGHT_PX = 170
 _SHARE = (0.0, 1.0)
-_ROOM = 0.08
 
 
 class Curve(NamedTuple):
@@ -115,12 +114,6 @@ def _scales(limits: tuple[float, float]) -> dict[str, uplot.Scale]:
         "x": uplot.Scale(time=False, auto=False, range=(-SPAN_S, 0.0)),
         "y": uplot.Scale(auto=False, range=with_room(limits)),
     }
-
-
-def with_room(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return limits with room for the whole label of the highest tick."""
-    lower, upper = limits
-    return lower, upper + _ROOM * (upper - lower)
 
 
 def _probabilities(states: Sequence[str]) -> tuple[Curve, ...]:

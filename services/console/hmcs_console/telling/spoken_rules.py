@@ -41,7 +41,7 @@ def _row(state: str, states: Sequence[str], rules: Rules, now: bool) -> Markdown
     )
     cell = Markdown("**{}**" if now else "{}")
     shown = Markdown(" | ").join(map(cell.format, cells))
-    return Markdown("| {} {} |").format(dot(css(color_of(state, states))), shown)
+    return Markdown("| {}\u00a0{} |").format(dot(css(color_of(state, states))), shown)
 
 
 def _compliance(rules: Rules) -> str:

@@ -196,7 +196,9 @@ def _row(member: Member, health: Health | None) -> Markdown:
     if health is not None:
         counts = [sum(each.values()) for each in (health.lost, health.refused, health.late)]
     cells = Markdown(" | ").join(Markdown("{}").format(count) for count in counts)
-    return Markdown("| {} | {} {} | {} |").format(process_name(member), shown, well(health), cells)
+    return Markdown("| {} | {}\u00a0{} | {} |").format(
+        process_name(member), shown, well(health), cells
+    )
 
 
 def _doing(member: Member, health: Health | None) -> Markdown:
