@@ -17,11 +17,11 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hmcs.palette import FAINT as FAINT
-from hmcs.palette import GRID_COLOR, state_color
+from hmcs.palette import GRID_COLOR, STATE_COLORS, state_color
 from hmcs.palette import INK as INK
-from hmcs.palette import STATE_COLORS as COLORS
 from hmcs.palette import UNKNOWN_COLOR as UNKNOWN_COLOR
 
+COLORS = STATE_COLORS
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h")
 METHOD_COLORS = {
     "od-hmm": COLORS[0],
