@@ -130,7 +130,15 @@ KEPT: Mapping[type[Message], Keep] = {
 NOT_SHOWN = {
     *("Motion", "Step", "Command", "Handle", "Ask", "Description", "SettingsReport"),
     *("LastStepsQuestion", "LastSteps", "LoadModel", "ActivateRecognizer", "Record", "Train"),
-    *("OutlineQuestion", "SetLabels", "ChangeRecording", "Pairing", "StopRequest"),
+    *(
+        "ModelQuestion",
+        "ModelFile",
+        "OutlineQuestion",
+        "SetLabels",
+        "ChangeRecording",
+        "Pairing",
+        "StopRequest",
+    ),
 }
 """What the page says, or has no use for."""
 READ = {
