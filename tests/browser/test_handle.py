@@ -61,7 +61,7 @@ def test_a_second_page_cannot_operate_while_the_first_holds_the_handle(
         second.lift_to(place, LIFTED_M / 2)
         second.lift_to(place, LIFTED_M)
         second.let_go()
-        return second.sees("wait until that page lets go")
+        return second.sees("this handle moves nothing")
 
     second.until(refused, DRAG_S)
     assert {handle.operator for _, handle in heard.handles} == {operator}

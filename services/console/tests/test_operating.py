@@ -55,7 +55,7 @@ def test_what_other_pages_drag_moves_nothing_and_they_show_who_operates() -> Non
     assert outcome.operating == operating
     assert not outcome.handles
     assert outcome.notices == (
-        (4, "another page operates: wait until it lets go, or press Take over"),
+        (4, "another page operates: this handle moves nothing until it lets go"),
     )
     assert after(operating, Moved(4, 10.1, THERE)).operating == operating
     assert after(operating, LetGo(4)).operating.operator == "desk-page-3"

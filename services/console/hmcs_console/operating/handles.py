@@ -199,7 +199,7 @@ def waited(operating: Operating, now_s: float, lease_s: float) -> Outcome:
 def _after_grab(operating: Operating, event: Grabbed) -> Outcome:
     lease = leases.grabbed(operating.lease, event.client, event.at_s)
     if not leases.holds(lease, event.client):
-        notice = "another page operates: wait until it lets go, or press Take over"
+        notice = "another page operates: this handle moves nothing until it lets go"
         return Outcome(operating, notices=((event.client, notice),))
     held = operating._replace(
         lease=lease,
