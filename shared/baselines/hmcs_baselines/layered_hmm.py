@@ -60,6 +60,12 @@ KIND = RecognizerSpec(
     check=check_two_levels,
     segment=_segment,
 )
+CHAPTER_4 = KIND._replace(
+    name="chapter-4",
+    summary="layered HMM restarted where the pedal says, its task HMM on the winner",
+    source="Aarno 2007, 4.1-4.2",
+    settings=partial(LayeredHmmSettings, restart="given"),
+)
 FOURIER = KIND._replace(
     name="fourier",
     summary="discrete gesteme HMMs on a code book of Fourier features, restarted as a network",

@@ -48,9 +48,16 @@ LAWS: tuple[AssistLaw, ...] = (
     ),
     AssistLaw(
         "chapter-3",
-        "Aarno 2007, chapter 3 whole: (3.6) on its own recognizer, dead zone 20 mm",
+        "Aarno 2007, chapter 3 whole: (3.6) on its recognizer as it is written, dead zone 20 mm",
         _THESIS,
-        recognizer="directions-svm",
+        recognizer="chapter-3",
+        dead_zone_m=0.02,
+    ),
+    AssistLaw(
+        "directions",
+        "HMCS: the same law, directions by chords, Gaussians and a counted chain",
+        _THESIS,
+        recognizer="directions",
         dead_zone_m=0.02,
     ),
     AssistLaw("thesis", "Aarno 2007, (3.6)-(3.8), on the default recognizer", _THESIS),

@@ -95,7 +95,8 @@ RECOGNIZERS = (
     recognizer("online-network", "Li & Okamura 2003"),
     recognizer("gesteme-network", "Hundtofte et al. 2002, online"),
     recognizer("fourier", "Yu et al. 2005"),
-    recognizer("directions-svm", "Aarno 2007, chapter 3"),
+    recognizer("chapter-3", "Aarno 2007, chapter 3"),
+    recognizer("directions", "HMCS, after Aarno 2007, chapter 3"),
     recognizer("task-hmm", "Hannaford & Lee 1990"),
 )
 """Our recognizers that follow a task."""

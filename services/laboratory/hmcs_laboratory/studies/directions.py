@@ -45,7 +45,7 @@ Integers = NDArray[np.int64]
 
 What = Literal["number", "following"]
 Counting = Literal["chords", "kmeans-cusum", "silhouette"]
-Following = Literal["chapter-3", "thesis", "hmcs-segment-filter"]
+Following = Literal["chapter-3", "directions", "hmcs-segment-filter"]
 Name = Literal[Counting, Following]
 
 Follower = Callable[[Performance], Array]
@@ -194,7 +194,7 @@ def _silhouette(positions: Sequence[Array], rng: np.random.Generator) -> int:
     return max(scores, key=scores.__getitem__)
 
 
-def _chapter_3(
+def _by_directions(
     chosen: DirectionStateSettings, data: TaskSet, rng: np.random.Generator
 ) -> tuple[Array, Follower]:
     moves = [np.diff(own, axis=0) for own in _paths(data)]
@@ -276,8 +276,8 @@ _COUNTING: Mapping[Counting, Callable[[Sequence[Array], np.random.Generator], in
     "silhouette": _silhouette,
 }
 _FOLLOWING: Mapping[Following, Callable[[TaskSet, np.random.Generator], tuple[Array, Follower]]] = {
-    "chapter-3": partial(_chapter_3, DirectionStateSettings()),
-    "thesis": partial(_chapter_3, thesis_settings()),
+    "chapter-3": partial(_by_directions, thesis_settings()),
+    "directions": partial(_by_directions, DirectionStateSettings()),
     "hmcs-segment-filter": _segment_filter,
 }
 
@@ -292,6 +292,6 @@ DIRECTIONS = Study(
         "tasks": "1",
         "demonstrations": "3",
         "performances": "1",
-        "methods": "chords,silhouette,chapter-3,hmcs-segment-filter",
+        "methods": "chords,silhouette,directions,hmcs-segment-filter",
     },
 )

@@ -1,4 +1,6 @@
-"""Chapter 3 as a recognizer: which nominal direction is followed, and which task state that means.
+"""Recognizers by nominal directions: which one is followed, and which task state that means.
+
+Chapter 3 of the thesis is one of them, by its settings.
 
 Shapes: K slots (a slot is one gesteme in one task state), N directions, T steps.
 """
@@ -6,6 +8,7 @@ Shapes: K slots (a slot is one gesteme in one task state), N directions, T steps
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +34,9 @@ from hmcs_baselines.direction_states import (
     DirectionStateSettings,
     check_direction_states,
     learn_directions,
+    thesis_settings,
 )
+from hmcs_baselines.estimators import EstimatorSettings
 from hmcs_baselines.slots import (
     SlotChain,
     SlotFilter,
@@ -135,12 +140,28 @@ def _check(known: DirectionTask, task: Task) -> None:
 
 
 KIND = RecognizerSpec(
-    name="directions-svm",
-    summary="nominal motion directions found without labels, recognized step by step, and an HMM",
-    source="Aarno 2007, chapter 3",
+    name="directions",
+    summary="nominal directions by the best chords, a Gaussian about each, and a counted chain",
+    source="HMCS, after Aarno 2007, chapter 3",
     settings=DirectionTaskSettings,
     knowledge=DirectionTask,
     learn=_learn,
     recognizer=_recognizer,
     check=_check,
+)
+CHAPTER_3 = KIND._replace(
+    name="chapter-3",
+    summary="k-means and its elbow, support vectors with a sigmoid, a fully connected HMM",
+    source="Aarno 2007, 3.1: (3.1)-(3.5), with its own settings",
+    settings=partial(DirectionTaskSettings, directions=thesis_settings()),
+)
+DIRECTIONS_SVM = KIND._replace(
+    name="directions-svm",
+    summary="as `directions`, with support vectors in place of the Gaussians",
+    settings=partial(
+        DirectionTaskSettings,
+        directions=DirectionStateSettings(
+            discovery="recurring-chords", estimator=EstimatorSettings(kind="svm")
+        ),
+    ),
 )

@@ -12,16 +12,16 @@ from hmcs.recognition.registry import kind_named, recognizer_of, settings_of
 from hmcs.recognition.segments import LabeledSteps, labeled_steps
 from hmcs.recognition.task_chain import chain_of
 from hmcs_baselines.direction_states import DirectionFilter
-from hmcs_baselines.directions_svm import DirectionTaskSettings, direction_shares
+from hmcs_baselines.direction_tasks import DirectionTaskSettings, direction_shares
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 
 @cache
 def taught(discovery: str = "recurring-chords", estimator: str = "gaussian") -> Model:
     given = {"directions.discovery": discovery, "directions.estimator.kind": estimator}
-    chosen = settings_of(kind_named("directions-svm"), given)
+    chosen = settings_of(kind_named("directions"), given)
     demonstrations = [performed(seed) for seed in range(4)]
-    return learn(lesson_task(), demonstrations, chosen, recognizer="directions-svm")
+    return learn(lesson_task(), demonstrations, chosen, recognizer="directions")
 
 
 @pytest.mark.parametrize("discovery", ["chords", "recurring-chords", "kmeans-cusum", "labels"])
@@ -63,7 +63,7 @@ def test_directions_lie_on_the_axes_of_the_task() -> None:
     fields = lesson_task().model_dump()
     fields["recognition"] = {"axes": ["x", "y"]}
     task = type(lesson_task()).model_validate(fields)
-    model = learn(task, [performed(seed) for seed in range(3)], recognizer="directions-svm")
+    model = learn(task, [performed(seed) for seed in range(3)], recognizer="directions")
     assert model.knowledge.directions.directions.shape[1] == 2
     recognizer = recognizer_of(model)
     for step in steps_performed(62):
@@ -80,7 +80,7 @@ def test_the_segment_begins_where_its_state_became_likely() -> None:
 
 
 def test_knowledge_that_does_not_fit_is_refused() -> None:
-    check, known = kind_named("directions-svm").check, taught().knowledge
+    check, known = kind_named("directions").check, taught().knowledge
     check(known, lesson_task())
     directions = known.directions
     for spoiled in (
@@ -100,5 +100,5 @@ def test_the_defaults_need_no_order_common_to_all_demonstrations() -> None:
     assert DirectionTaskSettings().directions.discovery == "recurring-chords"
     backward = ("lift", "turn", "reach")
     shown = [performed(0), performed(1), performed(2, backward), performed(3, backward)]
-    model = learn(lesson_task(), shown, recognizer="directions-svm")
+    model = learn(lesson_task(), shown, recognizer="directions")
     assert len(model.knowledge.directions.initial) >= 3
