@@ -20,6 +20,7 @@ LONGEST, LONGEST_IN_REPORT = 500, 10_000
 _CUT = "…"
 _MOST_MARKS = 3
 """Marks that one letter may bear: a pile of them covers the lines above and below."""
+_COLOR = re.compile("#[0-9a-fA-F]{6}")
 _WORD_JOINER = "\u2060"
 # Markdown makes a link of each of them in running text, even where it was written as entities.
 _LINK = re.compile(r"https?(?=://)|www(?=\.)|@", re.IGNORECASE)
@@ -82,6 +83,13 @@ class Markdown(str):
 
     def __mul__(self, count: SupportsIndex, /) -> Self:
         return type(self)(super().__mul__(count))
+
+
+def colored_dot(color: str) -> Markdown:
+    """Return a dot in a color, `#rrggbb` in hexadecimal; ValueError for anything else."""
+    if not _COLOR.fullmatch(color):
+        raise ValueError(f"{color!r}: expected a color as #rrggbb")
+    return Markdown(f'<span style="color:{color.lower()}">●</span>')
 
 
 class _Escaping(string.Formatter):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.shown import LONGEST, Markdown, as_figure, as_html, as_markdown, plain
+from hmcs.shown import LONGEST, Markdown, as_figure, as_html, as_markdown, colored_dot, plain
 
 TEXTS = st.text(st.characters(exclude_categories=()), max_size=40)
 JOINER = "\u2060"
@@ -134,3 +134,10 @@ def test_a_template_looks_nothing_up_in_what_it_is_filled_with() -> None:
 def test_what_fills_a_template_comes_out_as_it_reads(one: str, other: str) -> None:
     reported = Markdown("{} and {other}").format(one, other=other)
     assert read_back(reported) == f"{plain(one)} and {plain(other)}"
+
+
+def test_a_dot_has_a_color_and_nothing_else_gets_into_its_markup() -> None:
+    assert colored_dot("#AA00ff") == '<span style="color:#aa00ff">●</span>'
+    for color in ('#000000"><script>', "red", "#00000", "#0000000", ""):
+        with pytest.raises(ValueError, match="expected a color as #rrggbb"):
+            colored_dot(color)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hmcs.bus.service import UserError
 from hmcs_console.seeing.models import (
     MOST_MISSED,
     MOST_TOLD,
@@ -26,8 +25,8 @@ LOG = logging.getLogger("test")
 def test_models_are_found_in_files_and_folders(model_file: Path, tmp_path: Path) -> None:
     assert [model.name for model in load_models([model_file])] == ["lines"]
     assert [model.name for model in load_models([model_file.parent])] == ["lines"]
-    with pytest.raises(UserError, match="no model file"):
-        load_models([tmp_path])
+    # It may fill while the page is open.
+    assert load_models([tmp_path]) == ()
 
 
 def test_the_task_is_the_named_one_else_that_of_the_first_model(model_file: Path) -> None:

@@ -125,8 +125,8 @@ def test_a_dead_zone_larger_than_the_motion_makes_a_simulated_device_unhealthy(
         (["--task", "none"], "human-shapes, lines-through-obstacles"),
         (
             ["--source", "joystick"],
-            "choose of: gamepad, keyboard, mouse, page, recorded, recording, simulated, spacemouse,"
-            " synthetic",
+            "choose of: gamepad, keyboard, mouse, page, recorded, recording, ros2, simulated, "
+            "spacemouse, synthetic",
         ),
         (["--device", '{"axes": {"x": "up"}}'], "device.axes.x"),
         (["--source", "gamepad", "--device.axes.z", "rz"], "this device has no axis 'rz'"),

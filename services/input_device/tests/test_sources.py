@@ -184,7 +184,7 @@ def test_a_device_that_cannot_be_loaded_or_is_not_there_is_a_users_mistake() -> 
     with pytest.raises(
         UserError,
         match="choose of: arm, broken, gamepad, keyboard, mouse, page, recorded, recording, "
-        "simulated, spacemouse, synthetic",
+        "ros2, simulated, spacemouse, synthetic",
     ):
         opened(source="joystick")
 

@@ -48,5 +48,5 @@ def test_nothing_to_leave_out_is_reported(task, performances):
 
 def test_an_unknown_setting_is_reported(task, performances):
     demonstrations = [performances(ORDER, seed) for seed in range(2)]
-    with pytest.raises(UserError, match="no setting 'heat'"):
+    with pytest.raises(UserError, match="unknown setting 'heat'"):
         choose(task, demonstrations, {"heat": ["3"]}, recognizer="segment-filter")

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hmcs.fixtures.controller.rules import Rules, rules_of
-from hmcs.shown import Markdown
+from hmcs.shown import Markdown, colored_dot
 from hmcs.task import Task
 from hmcs.task.fixture_parts import VolumeSetup
 from hmcs_console.shapes.palette import color_of, css
-from hmcs_console.telling.words import dot
 
 _HEAD = Markdown("| state | law, compliance | up to k | tube, mm | leads |\n|---|---|---|---|---|")
 
@@ -41,7 +40,7 @@ def _row(state: str, states: Sequence[str], rules: Rules, now: bool) -> Markdown
     )
     cell = Markdown("**{}**" if now else "{}")
     shown = Markdown(" | ").join(map(cell.format, cells))
-    return Markdown("| {}\u00a0{} |").format(dot(css(color_of(state, states))), shown)
+    return Markdown("| {}\u00a0{} |").format(colored_dot(css(color_of(state, states))), shown)
 
 
 def _compliance(rules: Rules) -> str:

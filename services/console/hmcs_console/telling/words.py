@@ -10,7 +10,7 @@ from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, Training
 from hmcs.palette import STATE_COLORS
 from hmcs.process_words import ILL, LATE, LOST, NOBODY, OK, REFUSED, detail, process_name, well
 from hmcs.recognizer_takeover import Agreement
-from hmcs.shown import Markdown
+from hmcs.shown import Markdown, colored_dot
 from hmcs_console.seeing.marking import Marking
 from hmcs_console.shapes.palette import color_of, css
 
@@ -18,7 +18,7 @@ RECORDING = "#d00000"
 MOST_NAMES = 12
 """Of a list of names so many are written out."""
 _ROWS = Markdown("\n")
-_HEAD = Markdown(f"| process | | {LOST} | {REFUSED} | {LATE} |\n|---|---|---|---|---|")
+_HEAD = Markdown("| process | | {} | {} | {} |\n|---|---|---|---|---|").format(LOST, REFUSED, LATE)
 _LINES, _PARAGRAPHS = Markdown("  \n"), Markdown("\n\n")
 _REASONS = {
     "guiding": "guides: the state is recognized",
@@ -45,7 +45,7 @@ def why(belief: Belief | None, states: Sequence[str] = ()) -> Markdown:
         return Markdown("**Nothing is recognized**: no recognizer has said anything yet.")
     lines = [
         Markdown("{} **{}** {:.0%}, unknown {:.0%}").format(
-            dot(css(color_of(belief.likely_state, states))),
+            colored_dot(css(color_of(belief.likely_state, states))),
             belief.likely_state,
             belief.confidence,
             belief.unknown,
@@ -93,12 +93,7 @@ def recording(path: str) -> Markdown:
     if not path:
         return Markdown("")
     name = path.rpartition("/")[2]
-    return Markdown("{} **recording** to {}").format(dot(RECORDING), name)
-
-
-def dot(color: str) -> Markdown:
-    """Return a dot in a color of this house, `#rrggbb`."""
-    return Markdown(f'<span style="color:{color.lower()}">●</span>')
+    return Markdown("{} **recording** to {}").format(colored_dot(RECORDING), name)
 
 
 def operating() -> Markdown:
@@ -191,7 +186,7 @@ def _standing(robot: RobotState) -> Markdown:
 
 
 def _row(member: Member, health: Health | None) -> Markdown:
-    shown = dot(STATE_COLORS[2] if well(health) == OK else RECORDING)
+    shown = colored_dot(STATE_COLORS[2] if well(health) == OK else RECORDING)
     counts: Sequence[object] = ("", "", "")
     if health is not None:
         counts = [sum(each.values()) for each in (health.lost, health.refused, health.late)]
