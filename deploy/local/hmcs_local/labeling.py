@@ -28,7 +28,7 @@ from hmcs.recordings.stretches import (
 )
 from hmcs.shown import plain
 from hmcs.task import Task
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 
 _SET = re.compile(
     r"\s*(?P<begin>\d+(?:\.\d*)?|\.\d+)\s*[-–]\s*(?P<end>\d+(?:\.\d*)?|\.\d+)\s*=(?P<state>.*)"

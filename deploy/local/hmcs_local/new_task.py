@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 from hmcs.bus.keys import KeyNameError, check_name
 from hmcs.errors import UserError
 from hmcs.task import check_task
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 from hmcs.whole_files import written_whole
 
 Plane = Literal["xy", "xz", "yz"]

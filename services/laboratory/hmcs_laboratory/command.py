@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 from hmcs_laboratory.report import as_json, as_table, progress_shown, studies_table
 from hmcs_laboratory.running import measure
 from hmcs_laboratory.studies import STUDIES

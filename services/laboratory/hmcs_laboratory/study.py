@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 
 Scalar = str | int | float
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from hmcs.arrays import Array
-from hmcs_robot.arm_description import ArmDescription
+
+if TYPE_CHECKING:
+    from hmcs_robot.arm_description import ArmDescription
 
 
 class Pose(NamedTuple):
@@ -21,11 +23,11 @@ class JointLimits(NamedTuple):
     """What the joints of an arm can do; all of shape (n,)."""
 
     lower: Array
-    """rad."""
+    """rad, m of a prismatic joint; minus infinity of one that turns without end."""
     upper: Array
-    """rad."""
+    """rad or m; infinity of a joint that turns without end."""
     speed: Array
-    """rad/s."""
+    """rad/s or m/s."""
 
 
 class Nearest(NamedTuple):

@@ -63,7 +63,10 @@ def inverse_kinematics(arm: Kinematics, robot: str, target: Pose, home: Array) -
     if _reached(first) and _is_comfortable(arm, first.joint_positions):
         return first.joint_positions
     random = np.random.default_rng(0)
-    starts = random.uniform(limits.lower, limits.upper, (_TRIES, len(home)))
+    # A joint that turns without end is tried within a turn.
+    lower = np.where(np.isfinite(limits.lower), limits.lower, -np.pi)
+    upper = np.where(np.isfinite(limits.upper), limits.upper, np.pi)
+    starts = random.uniform(lower, upper, (_TRIES, len(home)))
     found = [first, *(_descend(arm, target, start) for start in starts)]
     reached = [solution for solution in found if _reached(solution)]
     if not reached:

@@ -1,25 +1,40 @@
-"""The arms that can be simulated, and where their descriptions are."""
+"""The arms that can be simulated: those that come along, and one's own, described by a URDF."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 from hmcs.errors import UserError
+from hmcs.task import RobotSetup
+from hmcs.task.robots import brought_robots
+
+JointPositions = tuple[float, ...] | Mapping[str, float]
+"""rad, or m of a prismatic joint: of all joints in their order, or by joint."""
 
 
 class RobotModel(NamedTuple):
     """One arm as its URDF describes it, and what the URDF does not say."""
 
     urdf: Path
-    tool_link: str
-    """The link whose frame, shifted by `tool_offset_m` along its z, is the tool frame."""
-    tool_offset_m: float
-    home: tuple[float, ...]
-    """rad; where the search for the first pose begins: comfortable, with the tool along +x."""
-    joint_speed_rad_s: tuple[float, ...] | None
+    tool_link: str | None
+    """The link whose frame, shifted by `tool_offset_m` along its z, is the tool frame; None where
+    there is only one that may be."""
+    tool_offset_m: float = 0.0
+    home: JointPositions | None = None
+    """Where the search for the first pose begins: comfortable, with the tool along +x; None where
+    it is to be found."""
+    joint_speed_rad_s: tuple[float, ...] | None = None
     """Largest joint speeds where those of the URDF are not the maker's."""
+    base_link: str | None = None
+    """The link whose frame is the base frame; None for the root."""
+    package_path: tuple[Path, ...] = ()
+    """Folders that hold the packages of `package://` names."""
+    poses: Mapping[str, JointPositions] = {}
+    """Postures with names."""
 
 
 def _public() -> Path:
@@ -62,13 +77,41 @@ ROBOTS = {name: model for name, model in _KNOWN.items() if model.urdf.is_file()}
 
 
 def robot_named(name: str) -> RobotModel:
-    """Return the robot of that name.
+    """Return the robot of that name, which comes along or which another distribution brings.
 
     Raises UserError where its description, which comes with PyBullet, is not installed.
     """
-    if name not in ROBOTS:
-        raise UserError(
-            f"robot {name}: its description comes with PyBullet, which has wheels for CPython 3.11 "
-            f"alone and is not installed: choose {' or '.join(ROBOTS)}, or run on CPython 3.11"
-        )
-    return ROBOTS[name]
+    for robots in (ROBOTS, *brought_robots()):
+        if name in robots:
+            model: RobotModel = robots[name]
+            return model
+    raise UserError(
+        f"robot {name}: its description comes with PyBullet, which has wheels for CPython 3.11 "
+        f"alone and is not installed: choose {' or '.join(ROBOTS)}, or run on CPython 3.11"
+    )
+
+
+def model_of(setup: RobotSetup) -> RobotModel:
+    """Return the arm of a task, whose file is read by `load_task`; raises as `robot_named`."""
+    if setup.urdf is None:
+        return robot_named(setup.model or "")
+    return RobotModel(
+        urdf=Path(setup.urdf),
+        tool_link=setup.tool_link,
+        tool_offset_m=setup.tool_offset_m,
+        home=setup.home,
+        base_link=setup.base_link,
+        package_path=(*map(Path, setup.package_path), *ros_package_path()),
+        poses=setup.poses,
+    )
+
+
+def ros_package_path() -> tuple[Path, ...]:
+    """Return the folders where ROS would look for packages."""
+    named = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    shares = [
+        str(Path(prefix) / "share")
+        for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+        if prefix
+    ]
+    return tuple(Path(folder) for folder in (*named, *shares) if folder)

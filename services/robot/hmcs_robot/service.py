@@ -27,7 +27,7 @@ from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import LOOKS, STOP
 from hmcs.supervision import Order
 from hmcs.task import load_task
-from hmcs_robot.arm_description import arm_description, missing_meshes
+from hmcs_robot.arm_description import arm_description
 from hmcs_robot.channel import (
     Closed,
     Snapshot,
@@ -38,7 +38,8 @@ from hmcs_robot.channel import (
     writer_id,
 )
 from hmcs_robot.control_room import ControlRoom, ControlRoomError
-from hmcs_robot.robots import robot_named
+from hmcs_robot.description.described import describe
+from hmcs_robot.robots import model_of
 from hmcs_robot.settings import RobotSettings
 
 SIGN_EVERY_S = 0.02
@@ -49,6 +50,8 @@ PAIRINGS_KEPT = 16
 """Fixture controllers whose pairing is remembered."""
 ORIGINS_KEPT = 256
 """Orders whose operator sample is remembered until the control room says that it took them."""
+MOST_NOTES = 40
+"""What an arm's file leaves out, said at the start; `hmcs robot check` says all."""
 NS_PER_S = 1_000_000_000
 
 
@@ -62,6 +65,7 @@ class Robot(Service):
     def __init__(self, settings: RobotSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
+        self._arm = describe(model_of(self._task.robot))
         self._limited = RateLimitedLog(log)
         self._room = ControlRoom(settings, log)
         self._lock = threading.Lock()
@@ -89,12 +93,8 @@ class Robot(Service):
                 "links that reach into a forbidden region at the start are not kept out of it",
                 extra={"links": ", ".join(self._room.links_within)},
             )
-        missing = missing_meshes(robot_named(self._task.robot.model).urdf)
-        if missing:
-            self.log.warning(
-                "meshes that the URDF names and nobody can draw: there is no such file",
-                extra={"meshes": ", ".join(missing)},
-            )
+        for note in self._arm.notes[:MOST_NOTES]:
+            self.log.warning(f"{self._arm.urdf.file}:{note.line}: {note.message}")
         bus.every(SIGN_EVERY_S, self._give_sign)
         self._room.read(self._take_snapshot, lambda: bus.soon(self._on_end))
 
@@ -112,7 +112,7 @@ class Robot(Service):
     def facts(self) -> dict[str, str]:
         """Return which robot this is."""
         return {
-            "robot": self._task.robot.model,
+            "robot": self._task.robot.name,
             "task": self._task.name,
             "engine": self._room.engine,
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
@@ -240,7 +240,7 @@ class Robot(Service):
 
     def _state(self, snapshot: Snapshot) -> RobotState:
         return RobotState(
-            robot=self._task.robot.model,
+            robot=self._task.robot.name,
             joint_names=self._joint_names,
             joint_positions=snapshot.joint_positions,
             joint_velocities=snapshot.joint_velocities,
@@ -259,7 +259,5 @@ class Robot(Service):
         )
 
     def _robot_description(self, _: Ask) -> RobotDescription:
-        robot_description = arm_description(
-            robot_named(self._task.robot.model).urdf, self._joint_names
-        )
-        return RobotDescription(robot=self._task.robot.model, **robot_description._asdict())
+        robot_description = arm_description(self._arm)
+        return RobotDescription(robot=self._task.robot.name, **robot_description._asdict())

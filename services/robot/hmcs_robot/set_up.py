@@ -9,6 +9,7 @@ from hmcs.task import Task
 from hmcs_robot.control import Tuning
 from hmcs_robot.driver import ArmDriver, Pose
 from hmcs_robot.limits import Limits
+from hmcs_robot.robots import model_of
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation
 
@@ -32,7 +33,13 @@ def simulated(task: Task, settings: RobotSettings) -> Simulation:
     """Return the arm of a task, simulated; raises UserError as `Simulation` does."""
     start = Pose(np.array(task.robot.tool_start_m), np.array(task.robot.tool_orientation_xyzw))
     return Simulation(
-        Scene(task.robot.model, start, task.workspace.obstacles, task.workspace.forbidden),
+        Scene(
+            task.robot.name,
+            start,
+            task.workspace.obstacles,
+            task.workspace.forbidden,
+            model_of(task.robot),
+        ),
         1.0 / settings.physics_rate_hz,
         engine=settings.engine,
         gui=settings.gui,

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm_description import ArmDescription, arm_description
+from hmcs_robot.description.described import check_follows, describe
 from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
 from hmcs_robot.kinematics import inverse_kinematics
-from hmcs_robot.robots import robot_named
+from hmcs_robot.robots import RobotModel, robot_named
 
 _TOUCHING_M = 0.0005
 """Nearer than this counts as contact: the solver keeps bodies about so far apart."""
@@ -37,12 +36,14 @@ class Scene(NamedTuple):
     """What is simulated."""
 
     robot: str
-    """As in a task file."""
+    """As in a task file, or the name of `model`."""
     start: Pose
     """Of the tool."""
     obstacles: tuple[Obstacle, ...]
     forbidden: tuple[ForbiddenRegion, ...] = ()
     """Regions that the links are kept out of; they are no bodies to collide with."""
+    model: RobotModel | None = None
+    """The arm; None for the one of that name."""
 
 
 class Simulation:
@@ -66,12 +67,14 @@ class Simulation:
     ) -> None:
         self.name = scene.robot
         self._reach_m = reach_m
-        model = robot_named(scene.robot)
+        model = scene.model or robot_named(scene.robot)
+        self._described = describe(model)
+        check_follows(self._described)
         self.engine_name, opens = engine_named(engine)
         self.engine = opens(Cell(model, scene.obstacles, scene.forbidden), period_s, gui=gui)
         try:
             self.home = inverse_kinematics(
-                self.engine, scene.robot, scene.start, np.array(model.home)
+                self.engine, scene.robot, scene.start, self._described.home
             )
             self.engine.place(self.home)
             # A base that stands behind the plane of a table is there to stay.
@@ -105,7 +108,7 @@ class Simulation:
 
     def robot_description(self) -> ArmDescription:
         """Return what is needed to draw the arm."""
-        return arm_description(robot_named(self.name).urdf, self.joint_names)
+        return arm_description(self._described)
 
     def close(self) -> None:
         """End the simulation."""

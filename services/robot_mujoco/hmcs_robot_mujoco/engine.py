@@ -37,9 +37,10 @@ class MujocoEngine:
         self._data = mujoco.MjData(self._model)
         self._elsewhere = mujoco.MjData(self._model)
         """For what is asked of a posture that the arm is not in."""
-        self.limits, self.joint_names = cell_of.limits, cell_of.joint_names
-        self._torques = cell_of.torques
-        self._tool = int(self._model.body(cell.model.tool_link).id)
+        arm = cell_of.arm
+        self.limits, self.joint_names = arm.chain.limits, arm.chain.joint_names
+        self._torques = arm.chain.efforts
+        self._tool = int(self._model.body(arm.tool_link).id)
         self._tool_offset = np.array([0.0, 0.0, cell.model.tool_offset_m])
         self._mass = np.zeros((self._model.nv, self._model.nv))
         self._obstacles = cell_of.obstacles
@@ -57,7 +58,7 @@ class MujocoEngine:
         self._to_regions = {
             name: Pairs(self._model, moving, list(geoms)) for name, geoms in cell_of.regions.items()
         }
-        self.place(np.array(cell.model.home))
+        self.place(arm.home)
         self._own_pairs = self._that_may_meet()
         self._window = _window(self._model, self._data) if gui else None
 

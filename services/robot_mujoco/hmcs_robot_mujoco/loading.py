@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -10,17 +9,14 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from hmcs.arrays import Array
 from hmcs.errors import UserError
-from hmcs_robot.arm_description import file_named
-from hmcs_robot.driver import JointLimits
+from hmcs_robot.description.described import DescribedArm, describe
+from hmcs_robot.description.meshes import READ
 from hmcs_robot.engine import Cell
-from hmcs_robot.robots import RobotModel
 from hmcs_robot.solids import Solid, solid_of, solids_of
 from hmcs_robot_mujoco.triangles import PROBE
 
 _GRAVITY_M_S2 = 9.81
-_MOVES = ("revolute", "continuous", "prismatic")
 _COMPILER = {
     "fusestatic": "false",  # a tool without mass keeps its frame
     "strippath": "false",
@@ -37,6 +33,8 @@ _KINDS = {
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
 }
 _READ_BY_MUJOCO = (".obj", ".stl")
+_READ = (*READ, ".ply")
+"""By MuJoCo, or by trimesh for it."""
 _STIFF = ((0.01, 1.0), (0.99, 0.999, 0.0005, 0.5, 2.0))
 """Time constant, s, and damping of a contact, and its impedance: the arm enters an obstacle by
 tenths of a millimeter."""
@@ -47,10 +45,7 @@ class Loaded(NamedTuple):
     """A cell in MuJoCo; geometries are numbered as in the model."""
 
     model: mujoco.MjModel
-    joint_names: tuple[str, ...]
-    limits: JointLimits
-    torques: Array
-    """The largest ones, N·m, shape (n,)."""
+    arm: DescribedArm
     obstacles: dict[int, str]
     """Names by geometry."""
     regions: dict[str, tuple[int, ...]]
@@ -59,9 +54,8 @@ class Loaded(NamedTuple):
 
 def loaded(cell: Cell, period_s: float) -> Loaded:
     """Return a cell in MuJoCo; raises UserError for an arm that MuJoCo cannot load."""
-    robot = _root(cell.model.urdf)
-    chain = _chain(robot, cell.model)
-    spec = _arm(robot, cell.model.urdf, chain.keys())
+    arm = _described(cell)
+    spec = _spec(arm)
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 1, 0
         geom.solref, geom.solimp = _STIFF
@@ -89,68 +83,34 @@ def loaded(cell: Cell, period_s: float) -> Loaded:
     numbers: dict[str, list[int]] = {region.name: [] for region in cell.forbidden}
     for name, (region_name, _) in regions.items():
         numbers[region_name].append(model.geom(name).id)
-    joints = [chain[model.joint(k).name] for k in range(model.njnt)]
-    speeds = cell.model.joint_speed_rad_s or [_number(joint, "velocity") for joint in joints]
-    lower, upper = (np.array([_end(joint, end) for joint in joints]) for end in ("lower", "upper"))
     return Loaded(
         model,
-        tuple(model.joint(k).name for k in range(model.njnt)),
-        JointLimits(lower, upper, np.array(speeds, dtype=float)),
-        np.array([_number(joint, "effort") for joint in joints]),
+        arm,
         {model.geom(name).id: obstacle.name for name, obstacle in obstacles.items()},
         {name: tuple(geoms) for name, geoms in numbers.items()},
     )
 
 
-def _root(urdf: Path) -> ElementTree.Element:
-    try:
-        return ElementTree.parse(urdf).getroot()
-    except (OSError, ElementTree.ParseError) as error:
-        raise UserError(f"{urdf}: is no URDF: {error}") from error
+def _described(cell: Cell) -> DescribedArm:
+    """Return the arm of a cell; raises UserError for one that this engine does not move."""
+    arm = describe(cell.model)
+    following = arm.followers_on_the_way
+    if following:
+        raise UserError(
+            f"{arm.urdf.file}: the joints {', '.join(following)} between base and tool mimic "
+            "others, which the engine mujoco does not do: use the engine pybullet"
+        )
+    return arm.with_followers_held()
 
 
-def _chain(robot: ElementTree.Element, model: RobotModel) -> dict[str, ElementTree.Element]:
-    """Return the joints between base and tool that move, by name."""
-    above = {_link(joint, "child"): joint for joint in robot.findall("joint")}
-    chain = {}
-    link = model.tool_link
-    while link in above:
-        joint = above.pop(link)
-        if joint.get("type") in _MOVES:
-            chain[joint.get("name", "")] = joint
-        link = _link(joint, "parent")
-    if not chain:
-        raise UserError(f"{model.urdf}: no joint moves the link {model.tool_link}")
-    return chain
-
-
-def _link(joint: ElementTree.Element, end: str) -> str:
-    found = joint.find(end)
-    return "" if found is None else found.get("link", "")
-
-
-def _number(joint: ElementTree.Element, name: str) -> float:
-    limit = joint.find("limit")
-    return float("nan" if limit is None else limit.get(name, "nan"))
-
-
-def _end(joint: ElementTree.Element, name: str) -> float:
-    """Return an end of a joint's range, rad or m; one that turns on and on has two turns."""
-    if joint.get("type") == "continuous":
-        return -2.0 * np.pi if name == "lower" else 2.0 * np.pi
-    return _number(joint, name)
-
-
-def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujoco.MjSpec:
-    """Return MuJoCo's description of an arm, its meshes read; all joints but some are held."""
+def _spec(arm: DescribedArm) -> mujoco.MjSpec:
+    """Return MuJoCo's description of an arm, its meshes read."""
+    robot = ElementTree.fromstring(arm.to_simulate(_READ))
     options = ElementTree.SubElement(robot, "mujoco")
     ElementTree.SubElement(options, "compiler", _COMPILER)
     meshes: dict[str, bytes] = {}
     for number, mesh in enumerate(robot.findall("link/collision/geometry/mesh")):
-        name = mesh.get("filename", "")
-        file = file_named(urdf, name)
-        if file is None:
-            raise UserError(f"{urdf}: names the mesh {name}, and there is no such file")
+        file = Path(mesh.get("filename", ""))
         unique = f"mesh_{number}{file.suffix.lower()}"
         if unique.endswith(_READ_BY_MUJOCO) and not _is_text_stl(file):
             meshes[unique] = file.read_bytes()
@@ -161,16 +121,11 @@ def _arm(robot: ElementTree.Element, urdf: Path, moved: Collection[str]) -> mujo
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
-    for joint in robot.findall("joint"):
-        if joint.get("name") not in moved:
-            joint.set("type", "fixed")
-            for mimic in joint.findall("mimic"):
-                joint.remove(mimic)
     text = ElementTree.tostring(robot, encoding="unicode")
     try:
         return mujoco.MjSpec.from_string(text, assets=meshes)
     except ValueError as error:
-        raise UserError(f"{urdf}: MuJoCo cannot read it: {error}") from error
+        raise UserError(f"{arm.urdf.file}: MuJoCo cannot read it: {error}") from error
 
 
 def _is_text_stl(file: Path) -> bool:

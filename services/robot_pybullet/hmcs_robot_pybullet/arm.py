@@ -1,70 +1,82 @@
 """An arm loaded into PyBullet: its joints, its tool frame and its Jacobian.
 
-PyBullet measures the points whose Jacobian it gives in a frame of its own, counts joints that are
-no part of the arm (fingers), and crashes on ndarrays; all of that ends here.
+PyBullet measures the points whose Jacobian it gives in a frame of its own, knows nothing of joints
+that follow others, and crashes on ndarrays; all of that ends here.
 """
 
 from __future__ import annotations
 
+import tempfile
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pybullet
 
 from hmcs.arrays import Array
+from hmcs.errors import UserError
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
-from hmcs_robot.driver import JointLimits, Pose
+from hmcs_robot.description.chain import Chain
+from hmcs_robot.description.described import DescribedArm
+from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN
-from hmcs_robot.robots import RobotModel
 
 BASE_LINK = -1
+_CAUGHT_UP_PER_S = 20.0
+"""Rate at which a joint that follows another is drawn to where it belongs."""
 
 
 class Arm:
     """One arm, fixed at the origin of a PyBullet client."""
 
-    def __init__(self, model: RobotModel, client: int) -> None:
+    def __init__(self, arm: DescribedArm, client: int) -> None:
         self._client = client
-        self.body: int = pybullet.loadURDF(
-            str(model.urdf),
-            useFixedBase=True,
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
+        self.body: int = _load(arm, client)
         infos = [
             pybullet.getJointInfo(self.body, index, physicsClientId=client)
             for index in range(pybullet.getNumJoints(self.body, physicsClientId=client))
         ]
         movable = [info for info in infos if info[2] != pybullet.JOINT_FIXED]
-        turning = [info for info in movable if info[2] == pybullet.JOINT_REVOLUTE]
-        self.joints: list[int] = [info[0] for info in turning]
-        self.other_joints: list[int] = [info[0] for info in movable if info not in turning]
-        self.joint_names = tuple(info[1].decode() for info in turning)
-        self.torques: list[float] = [info[10] for info in turning]
-        speeds = model.joint_speed_rad_s or [info[11] for info in turning]
-        self.limits = JointLimits(
-            np.array([info[8] for info in turning]),
-            np.array([info[9] for info in turning]),
-            np.array(speeds, dtype=float),
-        )
+        self.moving_joints: list[int] = [info[0] for info in movable]
+        """Those of the arm and those that follow them."""
+        names = [info[1].decode() for info in movable]
+        self._per_joint, self._offsets = _following(arm.chain, names)
+        self.joint_names = arm.chain.joint_names
+        self.joints: list[int] = [
+            self.moving_joints[names.index(name)] for name in self.joint_names
+        ]
+        self.efforts: list[float] = (np.abs(self._per_joint) @ arm.chain.efforts).tolist()
+        """Of the moving joints, N·m or N."""
+        self.limits = arm.chain.limits
         self._link_names: dict[int, str] = {info[0]: info[12].decode() for info in infos}
-        self._movable = len(movable)
-        self._tool_link = next(info[0] for info in infos if info[12].decode() == model.tool_link)
+        tool_link = arm.tool_link
+        self._tool_link = next(info[0] for info in infos if info[12].decode() == tool_link)
         self._inertial = [_inertial_frame(self.body, info[0], client) for info in infos]
         joints_below = {BASE_LINK: 0}
         for info in infos:
-            joints_below[info[0]] = joints_below[info[16]] + (info in turning)
+            joints_below[info[0]] = joints_below[info[16]] + (info in movable)
         self.moving_links = frozenset(link for link, below in joints_below.items() if below)
-        self.apart = self._far_links(joints_below, model)
+        self.apart = self._far_links(joints_below, arm.home)
         inertial = self._inertial[self._tool_link]
-        in_link = np.array([0.0, 0.0, model.tool_offset_m]) - inertial.position
+        in_link = np.array([0.0, 0.0, arm.model.tool_offset_m]) - inertial.position
         self._tool_from_mass: Array = _matrix(inertial).T @ in_link
+        try:
+            self.jacobian(arm.home)
+        except SystemError as error:
+            raise UserError(
+                f"{arm.urdf.file}: PyBullet cannot compute its Jacobian, for the inertia of a link "
+                "(it says above which): use the engine mujoco, or correct the inertia"
+            ) from error
 
-    def _far_links(self, joints_below: dict[int, int], model: RobotModel) -> list[tuple[int, int]]:
+    def _far_links(self, joints_below: dict[int, int], home: Array) -> list[tuple[int, int]]:
         """Pairs of links with so many joints between them that they may meet but do not at home."""
-        self.place(np.array(model.home))
-        links = sorted(joints_below)
+        self.place(home)
+        links = [
+            link
+            for link in sorted(joints_below)
+            if pybullet.getCollisionShapeData(self.body, link, physicsClientId=self._client)
+        ]
         return [
             (one, other)
             for one, other in combinations(links, 2)
@@ -79,9 +91,28 @@ class Arm:
         return self._link_names.get(link, "base")
 
     def place(self, joint_positions: Array) -> None:
-        """Put the arm at `joint_positions`, rad, shape (n,), at rest."""
-        for joint, position in zip(self.joints, joint_positions.tolist(), strict=True):
+        """Put the arm at `joint_positions`, rad or m, shape (n,), at rest."""
+        for joint, position in zip(
+            self.moving_joints, self._all_moving(joint_positions).tolist(), strict=True
+        ):
             pybullet.resetJointState(self.body, joint, position, physicsClientId=self._client)
+
+    def velocities(self, joint_velocities: Array) -> list[float]:
+        """Return the velocities of the moving joints, for those of the arm, rad/s or m/s, (n,)."""
+        velocities = self._per_joint @ joint_velocities
+        if len(self.moving_joints) > len(self.joints):
+            states = pybullet.getJointStates(
+                self.body, self.moving_joints, physicsClientId=self._client
+            )
+            at = dict(zip(self.moving_joints, (state[0] for state in states), strict=True))
+            wanted = self._all_moving(np.array([at[joint] for joint in self.joints]))
+            velocities = velocities + _CAUGHT_UP_PER_S * (wanted - list(at.values()))
+        followed: list[float] = velocities.tolist()
+        return followed
+
+    def _all_moving(self, joint_positions: Array) -> Array:
+        positions: Array = self._per_joint @ joint_positions + self._offsets
+        return positions
 
     def tool(self) -> Pose:
         """Return the pose of the tool frame where the arm is now."""
@@ -124,9 +155,8 @@ class Arm:
         inertial = self._inertial[link]
         # PyBullet counts along the axes of the mass, but from the origin of the link.
         point = from_mass + _matrix(inertial).T @ inertial.position
-        still = [0.0] * self._movable
-        # The arm's joints come before those of its fingers.
-        positions = joint_positions.tolist() + still[len(self.joints) :]
+        still = [0.0] * len(self.moving_joints)
+        positions = self._all_moving(joint_positions).tolist()
         parts = pybullet.calculateJacobian(
             self.body,
             link,
@@ -136,7 +166,40 @@ class Arm:
             still,
             physicsClientId=self._client,
         )
-        return np.vstack(parts)[:, : len(self.joints)]
+        jacobian: Array = np.vstack(parts) @ self._per_joint
+        return jacobian
+
+
+def _load(arm: DescribedArm, client: int) -> int:
+    """Load an arm, fixed at the origin; raises UserError where PyBullet does not read it."""
+    with tempfile.TemporaryDirectory(prefix="hmcs-arm-") as folder:
+        file = Path(folder) / "arm.urdf"
+        file.write_text(arm.to_simulate(), encoding="utf-8")
+        try:
+            body: int = pybullet.loadURDF(
+                str(file),
+                useFixedBase=True,
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                physicsClientId=client,
+            )
+        except pybullet.error as error:
+            raise UserError(
+                f"{arm.urdf.file}: PyBullet cannot load it ({error}): see what it wrote above, and "
+                "leave out the shapes it does not read"
+            ) from error
+    return body
+
+
+def _following(chain: Chain, names: list[str]) -> tuple[Array, Array]:
+    """Return how moving joints follow those of the arm: (m, n) and what is added, (m,)."""
+    per_joint, offsets = np.zeros((len(names), len(chain.joint_names))), np.zeros(len(names))
+    for row, name in enumerate(names):
+        if name in chain.followers:
+            leader, per_joint_of_it, offsets[row] = chain.followers[name]
+            per_joint[row, leader] = per_joint_of_it
+        else:
+            per_joint[row, chain.joint_names.index(name)] = 1.0
+    return per_joint, offsets
 
 
 def _inertial_frame(body: int, link: int, client: int) -> Pose:

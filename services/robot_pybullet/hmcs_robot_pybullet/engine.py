@@ -10,6 +10,7 @@ import pybullet
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion
+from hmcs_robot.description.described import describe
 from hmcs_robot.driver import Pose
 from hmcs_robot.engine import Cell, Meeting, Near
 from hmcs_robot_pybullet.arm import Arm
@@ -21,14 +22,14 @@ _GRAVITY_M_S2 = 9.81
 class PyBulletEngine:
     """An arm in a client of PyBullet of its own; see `hmcs_robot.engine.Engine`.
 
-    Raises UserError where no window opens.
+    Raises UserError where no window opens or PyBullet cannot load the arm.
     """
 
     def __init__(self, cell: Cell, period_s: float, *, gui: bool) -> None:
         self._client = _connect(gui)
         pybullet.setGravity(0, 0, -_GRAVITY_M_S2, physicsClientId=self._client)
         pybullet.setTimeStep(period_s, physicsClientId=self._client)
-        self._arm = Arm(cell.model, self._client)
+        self._arm = Arm(describe(cell.model), self._client)
         self.limits = self._arm.limits
         self.joint_names = self._arm.joint_names
         self.moving_links = self._arm.moving_links
@@ -45,15 +46,6 @@ class PyBulletEngine:
             add_obstacle(obstacle, self._client): obstacle.name for obstacle in cell.obstacles
         }
         self._regions = {region.name: add_region(region, self._client) for region in cell.forbidden}
-        for joint in self._arm.other_joints:
-            pybullet.setJointMotorControl2(
-                self._arm.body,
-                joint,
-                pybullet.VELOCITY_CONTROL,
-                targetVelocity=0,
-                force=100,
-                physicsClientId=self._client,
-            )
 
     def link_name(self, link: int) -> str:
         """Return the name of a link, as in the URDF."""
@@ -115,10 +107,10 @@ class PyBulletEngine:
         """Advance the physics by one period, with the motors at `joint_velocities`, rad/s, (n,)."""
         pybullet.setJointMotorControlArray(
             self._arm.body,
-            self._arm.joints,
+            self._arm.moving_joints,
             pybullet.VELOCITY_CONTROL,
-            targetVelocities=joint_velocities.tolist(),
-            forces=self._arm.torques,
+            targetVelocities=self._arm.velocities(joint_velocities),
+            forces=self._arm.efforts,
             physicsClientId=self._client,
         )
         pybullet.stepSimulation(physicsClientId=self._client)

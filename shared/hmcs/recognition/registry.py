@@ -22,7 +22,7 @@ from hmcs.recognition.recognizer import Guarded, PassEvidence, Recognizer
 from hmcs.recognition.segmentation import StateSegment
 from hmcs.recognition.segments import Segment
 from hmcs.task import Task
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 
 DEFAULT = "segment-filter"
 GROUP = "hmcs.recognizers"

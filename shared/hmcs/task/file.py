@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
 from hmcs.task.fixture_parts import FixtureSetup
-from hmcs.task.model import Draft, Location, Task, contradictions, unknown_name_message
+from hmcs.task.model import Draft, Location, Task, contradictions
 from hmcs.task.parts import (
     ForbiddenRegion,
     Gesteme,
@@ -23,7 +23,7 @@ from hmcs.task.parts import (
     State,
     Workspace,
 )
-from hmcs.task.values import Distribution
+from hmcs.task.values import Distribution, unknown_name_message
 from hmcs.task.yaml_lines import Document, YamlError, read_yaml
 
 T = TypeVar("T")
@@ -113,20 +113,31 @@ def find_task(path_or_name: str | Path) -> Path:
 
 
 def _with_files_beside(task: Task, file: Path) -> Task:
-    """Return the task with the files that it names as absolute paths."""
-    if all(region.file is None for region in task.workspace.forbidden):
-        return task
-    forbidden = tuple(
-        region
-        if region.file is None
-        else region.model_copy(update={"file": _beside(file, index, region.file)})
-        for index, region in enumerate(task.workspace.forbidden)
-    )
-    workspace = task.workspace.model_copy(update={"forbidden": forbidden})
-    return task.model_copy(update={"workspace": workspace})
+    """Return the task with the files and folders that it names as absolute paths."""
+    workspace, robot = task.workspace, task.robot
+    if any(region.file is not None for region in workspace.forbidden):
+        forbidden = tuple(
+            region
+            if region.file is None
+            else region.model_copy(
+                update={
+                    "file": _beside(file, ("workspace", "forbidden", index, "file"), region.file)
+                }
+            )
+            for index, region in enumerate(workspace.forbidden)
+        )
+        workspace = workspace.model_copy(update={"forbidden": forbidden})
+    if robot.urdf is not None:
+        folders = tuple(
+            _beside(file, ("robot", "package_path", index), folder)
+            for index, folder in enumerate(robot.package_path)
+        )
+        urdf = _beside(file, ("robot", "urdf"), robot.urdf)
+        robot = robot.model_copy(update={"urdf": urdf, "package_path": folders})
+    return task.model_copy(update={"workspace": workspace, "robot": robot})
 
 
-def _beside(file: Path, index: int, named: str) -> str:
+def _beside(file: Path, location: Location, named: str) -> str:
     path = file.parent / named
     try:
         # From Python 3.13 on, to resolve a circle of links is no error.
@@ -135,7 +146,6 @@ def _beside(file: Path, index: int, named: str) -> str:
         return str(path.resolve())
     except (OSError, RuntimeError, ValueError) as error:
         # A null byte, or links that lead in a circle.
-        location = ("workspace", "forbidden", index, "file")
         problem = problem_at(file, location, f"{named!r:.60} cannot be a path: {error}")
         raise TaskFileError([problem]) from error
 

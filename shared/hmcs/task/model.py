@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from difflib import get_close_matches
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -20,7 +19,7 @@ from hmcs.task.parts import (
     State,
     Workspace,
 )
-from hmcs.task.values import TWIST_AXES, Distribution, Name, Part
+from hmcs.task.values import TWIST_AXES, Distribution, Name, Part, unknown_name_message
 
 Location = tuple[str | int, ...]
 
@@ -98,14 +97,6 @@ class Contradiction(NamedTuple):
 
     location: Location
     message: str
-
-
-def unknown_name_message(what: str, name: str, choices: Iterable[str]) -> str:
-    """Return a sentence that says a name is unknown, which is nearest, and what there is."""
-    choices = sorted(choices)
-    near = get_close_matches(name, choices, n=1)
-    guess = f", did you mean {near[0]}?" if near else ""
-    return f"unknown {what} {name!r}{guess} (choose of: {', '.join(choices)})"
 
 
 def contradictions(draft: Draft) -> list[Contradiction]:

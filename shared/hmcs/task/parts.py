@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+import re
+from collections.abc import Mapping, Set
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from hmcs.task.fixture_parts import StateFixture
+from hmcs.task.robots import check_robot, known_robots
 from hmcs.task.values import (
     Axis,
     Distribution,
     Name,
     NotNegative,
+    Number,
     Part,
     Point,
     Positive,
@@ -216,10 +220,34 @@ class ToolSetup(Part):
         return self
 
 
+JointPositions = dict[str, Number] | tuple[Number, ...]
+"""rad, or m of a prismatic joint: by joint, or of all joints in their order."""
+_OF_A_URDF = ("tool_link", "base_link", "tool_offset_m", "home", "poses", "package_path")
+_NO_PART_OF_A_NAME = re.compile(r"[^A-Za-z0-9._-]+")
+_LONGEST_NAME = 64
+
+
 class RobotSetup(Part):
     """The robot, and where it begins."""
 
-    model: Literal["puma560", "iiwa", "panda"]
+    model: Annotated[str, AfterValidator(check_robot)] | None = None
+    """A robot that comes along; in place of urdf."""
+    urdf: Annotated[str, Field(min_length=1)] | None = None
+    """The description of an arm of one's own; beside the task file where it is no absolute path."""
+    tool_link: str | None = None
+    """Link of the URDF whose frame is the tool frame; may be left out where only one can be it."""
+    base_link: str | None = None
+    """Link of the URDF whose frame is the base frame; by default the one all others hang from."""
+    tool_offset_m: Number = 0.0
+    """The tool frame lies so far along the z axis of tool_link."""
+    home: JointPositions | None = None
+    """A comfortable posture, rad (m of prismatic joints), by joint or of all in their order; by
+    default one is found."""
+    poses: Mapping[Name, JointPositions] = {}
+    """Other postures of the arm, by name; as home."""
+    package_path: tuple[str, ...] = ()
+    """Folders that hold the packages of `package://` names in the URDF; beside the task file where
+    they are no absolute paths."""
     mode: Literal["teleoperated", "cooperative"] = "teleoperated"
     """`teleoperated`: it follows a hand elsewhere. `cooperative`: the hand leads it by its tool."""
     cooperation: Cooperation = Cooperation()
@@ -234,6 +262,33 @@ class RobotSetup(Part):
     """What the tool fills of the room where it is no ball; instead of tool_radius_m."""
     speed_limit_m_s: Positive = SPEED_LIMIT_M_S
     angular_speed_limit_rad_s: Positive = ANGULAR_SPEED_LIMIT_RAD_S
+
+    @property
+    def name(self) -> str:
+        """Which robot, as messages say it: its model, or the name of its URDF without the end."""
+        named = self.model if self.urdf is None else Path(self.urdf).stem
+        short = _NO_PART_OF_A_NAME.sub("-", named or "").strip("-._")[:_LONGEST_NAME]
+        return short or "robot"
+
+    @model_validator(mode="after")
+    def _is_one_robot(self) -> Self:
+        if (self.model is None) == (self.urdf is None):
+            both = "both model and urdf are given" if self.model else "no robot is named"
+            raise ValueError(
+                f"{both}, expected model: NAME (one of {', '.join(known_robots())}) or, for an arm "
+                "of your own, urdf: FILE"
+            )
+        needless = [
+            name
+            for name in _OF_A_URDF
+            if self.urdf is None and getattr(self, name) != type(self).model_fields[name].default
+        ]
+        if needless:
+            raise ValueError(
+                f"{', '.join(needless)} belongs to an arm of your own (urdf: FILE), and model "
+                f"{self.model} has its own: leave it out"
+            )
+        return self
 
     @model_validator(mode="after")
     def _has_one_tool(self) -> Self:

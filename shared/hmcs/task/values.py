@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -60,6 +61,14 @@ def different(value: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(axes)) < len(axes):
         raise ValueError(f"axes are {', '.join(value)}, expected each axis once")
     return value
+
+
+def unknown_name_message(what: str, name: str, choices: Iterable[str]) -> str:
+    """Return a sentence that says a name is unknown, which is nearest, and what there is."""
+    choices = sorted(choices)
+    near = get_close_matches(name, choices, n=1)
+    guess = f", did you mean {near[0]}?" if near else ""
+    return f"unknown {what} {name!r}{guess} (choose of: {', '.join(choices)})"
 
 
 Name = Annotated[str, AfterValidator(_name)]

@@ -152,7 +152,7 @@ MISTAKES = [
     ("radius_m: 0.1", "length_m: 0.1", 19, "workspace.obstacles[0]", "needs radius_m"),
     ("radius_m: 0.1", "radius_m: -1", 19, "workspace.obstacles[0].radius_m", "greater than 0"),
     ("sphere", "ball", 19, "workspace.obstacles[0].shape", "'box', 'sphere' or 'cylinder'"),
-    ("model: puma560", "model: puma", 21, "robot.model", "'puma560'"),
+    ("model: puma560", "model: puma", 21, "robot.model", "did you mean puma560?"),
     ("tool_start_m: [0, 0, 0.5]", "tool_start_m: [0, 2, 1.5]", 22, "robot.tool_start_m", "along z"),
     ("[0, 0, 0, 1]", "[0, 0, 0, 2]", 23, "robot.tool_orientation_xyzw", "length 2"),
     ("name: small\n", "name: small\nname: again\n", 3, "name", "second time"),

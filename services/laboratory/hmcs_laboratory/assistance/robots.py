@@ -16,7 +16,7 @@ import numpy as np
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import Task
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 
 ENTRY_POINTS = "hmcs.simulated_robots"
 LAG = "lag"

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 from hmcs.motion.chains import chained
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.lasa import drawings, shapes
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 from hmcs_baselines.clustering import assign
 from hmcs_baselines.direction_states import (
     DirectionStates,

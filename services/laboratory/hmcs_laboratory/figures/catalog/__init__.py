@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hmcs.errors import UserError
-from hmcs.task.model import unknown_name_message
+from hmcs.task.values import unknown_name_message
 from hmcs_laboratory.figures.catalog.beyond import BEYOND
 from hmcs_laboratory.figures.catalog.chapter2 import CHAPTER_2
 from hmcs_laboratory.figures.catalog.chapter3 import CHAPTER_3

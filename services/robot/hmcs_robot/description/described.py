@@ -1,0 +1,215 @@
+"""An arm with all that its description and its model say: read, checked and completed once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from hmcs.arrays import Array
+from hmcs.errors import UserError
+from hmcs_robot.description.chain import UNITS, Chain, chain_of
+from hmcs_robot.description.elements import Mistake
+from hmcs_robot.description.meshes import READ, MeshFiles, unusable
+from hmcs_robot.description.prepared import assumed_masses, prepared
+from hmcs_robot.description.urdf import Urdf, UrdfError, read_urdf, told
+from hmcs_robot.robots import JointPositions, RobotModel
+
+FEWEST_JOINTS = 6
+"""A tool is commanded in six directions."""
+_POSTURES = 512
+"""Among which the home of an arm without one is looked for."""
+_AROUND_MIDDLE = 0.6
+"""Share of the joints' ranges, about their middle, that these are drawn from."""
+_ROOM_ENOUGH = 0.3
+"""rad or m; more room to the ends of a range makes no posture better."""
+
+
+class DescribedArm(NamedTuple):
+    """An arm, its joints, its postures, and what was assumed of it."""
+
+    model: RobotModel
+    tool_link: str
+    urdf: Urdf
+    chain: Chain
+    files: MeshFiles
+    home: Array
+    """rad or m, shape (n,)."""
+    poses: Mapping[str, Array]
+    """Named postures."""
+    notes: tuple[Mistake, ...]
+    """What the file leaves out and what is assumed, and what it names and nobody can use."""
+
+    def to_simulate(self, formats: Collection[str] = READ) -> str:
+        """Return a URDF whose files are named by absolute paths, with meshes of these formats."""
+
+        def path(tag: str, name: str) -> str | None:
+            found = self.files.find(name)
+            if found is None or (tag == "mesh" and found.suffix.lower() not in formats):
+                return None
+            return str(found)
+
+        return prepared(self.urdf, self.chain, self.model.base_link, path)
+
+    def to_draw(self) -> str:
+        """Return a URDF whose files have the names of the description."""
+        return prepared(self.urdf, self.chain, self.model.base_link, lambda _, name: name)
+
+    @property
+    def told(self) -> str:
+        """What was assumed, a line each; empty where all is given."""
+        return told(self.urdf.file, self.notes)
+
+    @property
+    def followers_on_the_way(self) -> tuple[str, ...]:
+        """Joints between base and tool that follow others."""
+        path = self.urdf.path_to(self.tool_link, self.model.base_link or self.urdf.root)
+        return tuple(joint.name for joint in path if joint.name in self.chain.followers)
+
+    def with_followers_held(self) -> DescribedArm:
+        """Return the arm with joints that follow others held where they are at home."""
+        stand = {
+            name: multiplier * float(self.home[leader]) + offset
+            for name, (leader, multiplier, offset) in self.chain.followers.items()
+        }
+        chain = replace(self.chain, followers={}, held={**self.chain.held, **stand})
+        return self._replace(chain=chain)
+
+
+def describe(model: RobotModel) -> DescribedArm:
+    """Return an arm as its file describes it.
+
+    Raises UrdfError for a file that describes no such arm, with the lines; UserError for postures
+    that are none of this arm.
+    """
+    urdf = read_urdf(model.urdf)
+    tool_link = model.tool_link or only_tool_link(urdf)
+    chain = chain_of(urdf, tool_link, model.base_link, model.tool_offset_m)
+    if model.joint_speed_rad_s is not None:
+        speeds = np.array(model.joint_speed_rad_s, dtype=float)
+        if len(speeds) != len(chain.joint_names):
+            raise UserError(
+                f"{model.urdf}: {len(speeds)} joint speeds are given for its "
+                f"{len(chain.joint_names)} joints ({', '.join(chain.joint_names)})"
+            )
+        chain = chain.with_speeds(speeds)
+    files = MeshFiles(model.urdf, model.package_path)
+    home = (
+        comfortable_posture(chain)
+        if model.home is None
+        else posture(model.urdf, chain, "home", model.home)
+    )
+    poses = {
+        name: posture(model.urdf, chain, f"pose {name!r}", given)
+        for name, given in model.poses.items()
+    }
+    notes = (*chain.assumed, *assumed_masses(urdf, chain), *unusable(urdf, files))
+    return DescribedArm(model, tool_link, urdf, chain, files, home, poses, tuple(sorted(notes)))
+
+
+def check_follows(arm: DescribedArm) -> None:
+    """Raise UrdfError for an arm that cannot follow a tool's velocity in every direction."""
+    names, base = arm.chain.joint_names, arm.model.base_link or arm.urdf.root
+    if len(names) < FEWEST_JOINTS:
+        raise UrdfError(
+            f"{arm.urdf.file}:{arm.urdf.links[arm.tool_link]}: between {base!r} and "
+            f"{arm.tool_link!r} there are {len(names)} joints that move ({', '.join(names)}), "
+            f"expected {FEWEST_JOINTS} or more: a tool is commanded in six directions. Choose "
+            "another tool_link or base_link"
+        )
+
+
+def tool_links(urdf: Urdf) -> tuple[str, ...]:
+    """Return the links that may be a tool: with enough joints above, and nothing below or a name
+    that tools have.
+    """
+    parents = {joint.parent for joint in urdf.joints.values()}
+    candidates = []
+    for link in urdf.links:
+        usual = any(part in link.lower() for part in ("tool", "tcp", "ee_link", "flange", "grasp"))
+        if link in parents and not usual:
+            continue
+        try:
+            chain = chain_of(urdf, link)
+        except UrdfError:
+            continue
+        if len(chain.joint_names) < FEWEST_JOINTS:
+            continue
+        candidates.append((not usual, link))
+    return tuple(link for _, link in sorted(candidates, key=lambda each: each[0]))
+
+
+def only_tool_link(urdf: Urdf) -> str:
+    """Return the one link that may be the tool; raises UrdfError where there are more, or none."""
+    candidates = tool_links(urdf)
+    if len(candidates) == 1:
+        return candidates[0]
+    if not candidates:
+        raise UrdfError(
+            f"{urdf.file}: no link hangs on six or more joints that move (revolute, continuous or "
+            "prismatic, one after another): expected an arm. Name another link as tool_link to "
+            "read what is in its way"
+        )
+    raise UrdfError(
+        f"{urdf.file}: which link is the tool? Give tool_link, one of: {', '.join(candidates)}"
+    )
+
+
+def posture(urdf: Path, chain: Chain, what: str, given: JointPositions) -> Array:
+    """Return joint positions, (n,), given as a list or by joint; joints without one stand at 0.
+
+    Raises UserError, which names the joints, where they are not those of the arm or out of range.
+    """
+    names = chain.joint_names
+    if isinstance(given, Mapping):
+        for name in given:
+            if name not in names:
+                near = get_close_matches(name, names, n=1)
+                guess = f", did you mean {near[0]}?" if near else ""
+                raise UserError(
+                    f"{urdf}: {what} of the robot names {name!r}, which is no joint of the arm"
+                    f"{guess} (its joints are: {', '.join(names)})"
+                )
+        lower, upper = chain.finite_range
+        rest = np.where((lower <= 0) & (upper >= 0), 0.0, (lower + upper) / 2)
+        positions = np.array(
+            [given.get(name, float(at)) for name, at in zip(names, rest, strict=True)]
+        )
+    else:
+        if len(given) != len(names):
+            raise UserError(
+                f"{urdf}: {what} of the robot has {len(given)} positions, and the arm "
+                f"{len(names)} joints: {', '.join(names)}"
+            )
+        positions = np.array(given, dtype=float)
+    for name, kind, at, low, high in zip(
+        names, chain.kinds, positions, chain.limits.lower, chain.limits.upper, strict=True
+    ):
+        if not low <= at <= high:
+            raise UserError(
+                f"{urdf}: {what} of the robot has joint {name} at {at:g}, expected "
+                f"{low:g} to {high:g} {UNITS[kind]}"
+            )
+    return positions
+
+
+def comfortable_posture(chain: Chain) -> Array:
+    """Return a posture about the middle of the ranges, (n,), far from singularities and from ends.
+
+    Always the same for the same arm.
+    """
+    lower, upper = chain.finite_range
+    drawn = np.vstack([(lower + upper) / 2, chain.drawn(_POSTURES, _AROUND_MIDDLE)])
+    smallest = np.linalg.svd(chain.jacobians(drawn), compute_uv=False)[:, -1]
+    to_ends = np.minimum(drawn - chain.limits.lower, chain.limits.upper - drawn).min(axis=1)
+    best = int(np.argmax(smallest + 0.5 * np.minimum(to_ends, _ROOM_ENOUGH)))
+    return np.asarray(drawn[best])
+
+
+def joint_positions_text(positions: Sequence[float] | Array) -> str:
+    """Return joint positions as a task file has them."""
+    return "[" + ", ".join(f"{float(position):.4g}" for position in positions) + "]"
