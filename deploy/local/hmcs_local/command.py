@@ -21,6 +21,7 @@ from hmcs_local.commands import (
     operation,
     recognizers,
     recordings,
+    robot,
     stack,
     task,
     training,
@@ -46,6 +47,12 @@ app = typer.Typer(
 task_app = typer.Typer(help="Work with task files.", no_args_is_help=True)
 task_app.command()(task.check)
 app.add_typer(task_app, name="task")
+robot_app = typer.Typer(
+    help="Look at robots, one's own and those that come along.", no_args_is_help=True
+)
+robot_app.command()(robot.check)
+robot_app.command("list")(robot.list_robots)
+app.add_typer(robot_app, name="robot")
 app.add_typer(secure_app, name="secure")
 
 _IN_ORDER_OF_HELP = (

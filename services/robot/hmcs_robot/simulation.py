@@ -9,10 +9,11 @@ from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm_description import ArmDescription, arm_description
+from hmcs_robot.description.checking import reach_of
 from hmcs_robot.description.described import check_follows, describe
 from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
-from hmcs_robot.kinematics import inverse_kinematics
+from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
 from hmcs_robot.robots import RobotModel, robot_named
 
 _TOUCHING_M = 0.0005
@@ -73,9 +74,7 @@ class Simulation:
         self.engine_name, opens = engine_named(engine)
         self.engine = opens(Cell(model, scene.obstacles, scene.forbidden), period_s, gui=gui)
         try:
-            self.home = inverse_kinematics(
-                self.engine, scene.robot, scene.start, self._described.home
-            )
+            self.home = self._start_posture(scene)
             self.engine.place(self.home)
             # A base that stands behind the plane of a table is there to stay.
             self._within, self._granted_m = self._already_within(scene.forbidden)
@@ -113,6 +112,19 @@ class Simulation:
     def close(self) -> None:
         """End the simulation."""
         self.engine.close()
+
+    def _start_posture(self, scene: Scene) -> Array:
+        arm = self._described
+        try:
+            return inverse_kinematics(self.engine, scene.robot, scene.start, arm.home)
+        except UnreachablePoseError as error:
+            reach = reach_of(arm.chain)
+            ends = zip("xyz", reach.lower, reach.upper, strict=True)
+            box = ", ".join(f"{axis} {lower:.2f} to {upper:.2f}" for axis, lower, upper in ends)
+            raise UnreachablePoseError(
+                f"{error}. In some orientation its tool gets up to {reach.farthest_m:.2f} m from "
+                f"its base ({box} m)"
+            ) from error
 
     def _check_start(self) -> None:
         touched = self.read().contacts
