@@ -12,6 +12,7 @@ import numpy as np
 import pybullet
 import pytest
 
+from hmcs_robot.description.described import describe
 from hmcs_robot.robots import ROBOTS
 from hmcs_robot_pybullet.arm import Arm
 from support.puma560 import (
@@ -48,7 +49,7 @@ def puma(client: int) -> int:
 
 
 def test_forward_kinematics_is_the_dh_product(client: int) -> None:
-    arm = Arm(ROBOTS["puma560"], client)
+    arm = Arm(describe(ROBOTS["puma560"]), client)
     for q in CONFIGURATIONS:
         arm.place(q)
         tool = arm.tool()

@@ -27,6 +27,7 @@ ASSUMED_SPEED: Mapping[str, float] = {"revolute": 1.0, "continuous": 1.0, "prism
 """rad/s, m/s."""
 ASSUMED_EFFORT: Mapping[str, float] = {"revolute": 500.0, "continuous": 500.0, "prismatic": 2000.0}
 """N·m, N."""
+FORCES: Mapping[str, str] = {"revolute": "N·m", "continuous": "N·m", "prismatic": "N"}
 UNITS: Mapping[str, str] = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
 
 
@@ -303,17 +304,17 @@ def _limits(
     ranges = [_range(urdf, joint, assumed) for joint in own]
     lower, upper = (np.array(ends) for ends in zip(*ranges, strict=True))
     speed = np.array(
-        [_positive(j, j.speed, "velocity", ASSUMED_SPEED[j.kind], "/s", assumed) for j in own]
+        [
+            _positive(j, "velocity", j.speed, ASSUMED_SPEED[j.kind], f"{UNITS[j.kind]}/s", assumed)
+            for j in own
+        ]
     )
     efforts = np.array(
         [
-            _positive(
-                j, j.effort, "effort", ASSUMED_EFFORT[j.kind],
-                " (N)" if j.kind == "prismatic" else " (N·m)", assumed,
-            )
+            _positive(j, "effort", j.effort, ASSUMED_EFFORT[j.kind], FORCES[j.kind], assumed)
             for j in own
         ]
-    )  # fmt: skip
+    )
     for name, (leader, multiplier, offset) in followers.items():
         joint = urdf.joints[name]
         if joint is own[leader] or multiplier == 0.0:
@@ -369,18 +370,16 @@ def _range(urdf: Urdf, joint: Joint, assumed: list[Mistake]) -> tuple[float, flo
 
 def _positive(
     joint: Joint,
-    value: float | None,
     what: str,
+    given: float | None,
     assumption: float,
     unit: str,
     assumed: list[Mistake],
 ) -> float:
-    if value is not None and value > 0.0:
-        return value
-    unit = unit if unit.startswith(" ") else f" {UNITS[joint.kind]}{unit}"
-    given = "no" if value is None else f"a {what} of {value:g}, which lets nothing move:"
-    text = f"has no {what}:" if value is None else f"has {given}"
+    if given is not None and given > 0.0:
+        return given
+    lacks = f"no {what}" if given is None else f"{what} {given:g}, with which nothing moves"
     assumed.append(
-        Mistake(joint.limit_line, f"joint {joint.name} {text} {assumption:g}{unit} assumed")
+        Mistake(joint.limit_line, f"joint {joint.name} has {lacks}: {assumption:g} {unit} assumed")
     )
     return assumption

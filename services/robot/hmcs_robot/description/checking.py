@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hmcs.arrays import Array
-from hmcs_robot.description.chain import UNITS, Chain, pose_of
+from hmcs_robot.description.chain import FORCES, UNITS, Chain, pose_of
 from hmcs_robot.description.described import DescribedArm
 from hmcs_robot.driver import Pose
 
 _POSTURES = 20_000
+_STEPS, _STEP_RAD_PER_M = 400, 0.3
+"""Of the way on to where the tool gets farthest."""
 
 
 class Reach(NamedTuple):
@@ -39,8 +41,23 @@ class JointRow(NamedTuple):
 
 
 def reach_of(chain: Chain, postures: int = _POSTURES) -> Reach:
-    """Return where a tool gets to; other things in the room and the arm itself aside."""
-    points = chain.poses(chain.drawn(postures))[:, :3, 3]
+    """Return where a tool gets to; other things in the room and the arm itself aside.
+
+    From the postures that get farthest along each axis, and from the base, it is led on as far as
+    the joints' ranges let it.
+    """
+    drawn = chain.drawn(postures)
+    points = chain.poses(drawn)[:, :3, 3]
+    ways = np.vstack([np.eye(3), -np.eye(3)])
+    far = [*(points @ ways.T).argmax(axis=0), np.linalg.norm(points, axis=1).argmax()]
+    positions = drawn[far]
+    lower, upper = chain.finite_range
+    for _ in range(_STEPS):
+        tools = chain.poses(positions)[:, :3, 3]
+        onward = np.vstack([ways, tools[-1] / max(float(np.linalg.norm(tools[-1])), 1e-9)])
+        slopes = np.einsum("kan,ka->kn", chain.jacobians(positions)[:, :3], onward)
+        positions = np.clip(positions + _STEP_RAD_PER_M * slopes, lower, upper)
+    points = np.vstack([points, chain.poses(positions)[:, :3, 3]])
     farthest_m = float(np.linalg.norm(points, axis=1).max())
     return Reach(points, points.min(axis=0), points.max(axis=0), farthest_m)
 
@@ -68,7 +85,7 @@ def joint_rows(arm: DescribedArm) -> tuple[JointRow, ...]:
                 kind,
                 "without end" if turns else f"{lower:.3g} … {upper:.3g} {unit}",
                 f"{chain.limits.speed[index]:.3g} {unit}/s",
-                f"{chain.efforts[index]:.4g} {'N' if kind == 'prismatic' else 'N·m'}",
+                f"{chain.efforts[index]:.4g} {FORCES[kind]}",
                 ", ".join(what for what, is_missing in missing.items() if is_missing),
             )
         )
