@@ -8,7 +8,7 @@ from rich.console import Console
 
 from hmcs.errors import UserError
 from hmcs.shown import plain
-from hmcs.task import load_task
+from hmcs.task import Task, load_task
 from hmcs_local.tables import show_table
 from hmcs_robot.description.checking import joint_rows, reach_of, tool_at
 from hmcs_robot.description.described import (
@@ -73,6 +73,18 @@ def check_robot(
     if output is not None:
         draw_arm(arm, reach, output)
         _say(console, f"drawn: {output}")
+
+
+def check_own_robot(task: Task) -> list[str]:
+    """Return what the file of a task's own arm leaves out, a line each.
+
+    Raises UserError for an arm that cannot be used.
+    """
+    if task.robot.urdf is None:
+        return []
+    arm = describe(model_of(task.robot))
+    check_follows(arm)
+    return [plain(line, _LONGEST_LINE) for line in arm.told.splitlines()]
 
 
 def show_robots(console: Console) -> None:

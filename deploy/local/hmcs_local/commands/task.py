@@ -53,10 +53,13 @@ def check(
     from hmcs.fixtures.regions.workspace import check_workspace
     from hmcs.task import load_task
     from hmcs_local.demonstration_files import expanded
+    from hmcs_local.robots import check_own_robot
     from hmcs_trainer.training import checked
 
     task = load_task(file)
     check_workspace(file, task)
+    for line in check_own_robot(task):
+        typer.echo(line)
     shown = ""
     if demonstrations:
         count, findings = checked(task, expanded(demonstrations), typer.echo)
