@@ -127,7 +127,7 @@ class RosRobot(Service):
     def facts(self) -> dict[str, str]:
         """Return which robot this is."""
         return {
-            "robot": self._task.robot.model,
+            "robot": self._task.robot.name,
             "task": self._task.name,
             "commands": self.settings.command_topic,
             "refused_reports": str(self._arm.refused),
@@ -278,7 +278,7 @@ class RosRobot(Service):
         joints = self._arm.joints
         self._states.put(
             RobotState(
-                robot=self._task.robot.model,
+                robot=self._task.robot.name,
                 joint_names=joints.names,
                 joint_positions=joints.positions,
                 joint_velocities=joints.velocities,
@@ -304,7 +304,7 @@ class RosRobot(Service):
                 "robot_state_publisher"
             )
         return RobotDescription(
-            robot=self._task.robot.model,
+            robot=self._task.robot.name,
             urdf=self._arm.urdf,
             joints=self._arm.joints.names,
             files={},
