@@ -38,8 +38,8 @@ def test_the_robots_that_come_along_are_listed() -> None:
 def test_an_arm_is_shown_with_what_was_assumed_of_it(tmp_path: Path) -> None:
     file = written(tmp_path, arm().replace('effort="200"', "", 1))
     shown = hmcs(f"robot check {file}")
-    assert re.search(r"j1 +revolute +-2\.8 … 2\.8 rad +2 rad/s +500 N·m +effort", shown)
-    assert f"{file}:4: joint j1 has no effort: 500 N·m assumed" in shown
+    assert re.search(r"j1 +revolute +-2\.8 … 2\.8 rad +2 rad/s +20000 N·m +effort", shown)
+    assert f"{file}:4: joint j1 has no effort: 20000 N·m assumed" in shown
     assert "reach: 1.4" in shown
 
 

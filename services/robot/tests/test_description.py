@@ -202,7 +202,7 @@ def limited(more: str, kind: str = "revolute") -> str:
     [
         (limited(""), ["j2 has no range", "j2 has no velocity: 1 rad/s", "j2 has no effort"]),
         (limited('<limit lower="-1" upper="1" effort="9"/>'), ["j2 has no velocity: 1 rad/s"]),
-        (limited('<limit lower="-1" upper="1" velocity="2"/>'), ["j2 has no effort: 500 N·m"]),
+        (limited('<limit lower="-1" upper="1" velocity="2"/>'), ["j2 has no effort: 20000 N·m"]),
         (limited('<limit upper="1" effort="9" velocity="2"/>'), ["j2 has no lower limit: 0"]),
         (
             limited('<limit lower="-1" upper="1" effort="0" velocity="0"/>'),
@@ -210,7 +210,7 @@ def limited(more: str, kind: str = "revolute") -> str:
         ),
         (
             limited('<limit effort="0"/>', "prismatic"),
-            ["j2 has no range", "0.2 m/s", r"2000 N assumed"],
+            ["j2 has no range", "0.2 m/s", r"50000 N assumed"],
         ),
     ],
 )

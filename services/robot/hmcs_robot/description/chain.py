@@ -25,8 +25,8 @@ ASSUMED_RANGE: Mapping[str, tuple[float, float]] = {
 """rad, m; of a joint whose file gives none."""
 ASSUMED_SPEED: Mapping[str, float] = {"revolute": 1.0, "continuous": 1.0, "prismatic": 0.2}
 """rad/s, m/s."""
-ASSUMED_EFFORT: Mapping[str, float] = {"revolute": 500.0, "continuous": 500.0, "prismatic": 2000.0}
-"""N·m, N."""
+ASSUMED_EFFORT: Mapping[str, float] = {"revolute": 2e4, "continuous": 2e4, "prismatic": 5e4}
+"""N·m, N: enough to hold any arm, for one that is too weak sinks."""
 FORCES: Mapping[str, str] = {"revolute": "N·m", "continuous": "N·m", "prismatic": "N"}
 UNITS: Mapping[str, str] = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
 

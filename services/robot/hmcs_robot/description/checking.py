@@ -85,7 +85,7 @@ def joint_rows(arm: DescribedArm) -> tuple[JointRow, ...]:
                 kind,
                 "without end" if turns else f"{lower:.3g} … {upper:.3g} {unit}",
                 f"{chain.limits.speed[index]:.3g} {unit}/s",
-                f"{chain.efforts[index]:.4g} {FORCES[kind]}",
+                f"{chain.efforts[index]:.5g} {FORCES[kind]}",
                 ", ".join(what for what, is_missing in missing.items() if is_missing),
             )
         )
