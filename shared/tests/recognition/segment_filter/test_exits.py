@@ -110,3 +110,16 @@ def test_the_regression_finds_its_optimum_also_where_one_line_parts_the_examples
     weights = fit_exit(features, left)
     p = 1 / (1 + np.exp(-features @ weights))
     np.testing.assert_allclose(features.T @ (left - p), 0.05 * weights, atol=1e-6)
+
+
+def test_more_than_eight_steps_left_are_no_more_than_eight():
+    for left, counted in ((0.0, 0.0), (4.0, 4.0), (8.0, 8.0), (300.0, 8.0)):
+        line, square = at(-1.0, remaining=left)[0, 3:5]
+        assert (line, square) == (counted, pytest.approx(counted**2 / 8.0))
+
+
+def test_a_turn_past_the_end_and_one_short_of_it_count_oppositely():
+    for place in (-2.0, 1.0):
+        features = at(place, 1.0)[0]
+        assert features[9] == pytest.approx(0.25 * place * features[8])
+    assert at(0.0, 1.0)[0, 9] == 0.0

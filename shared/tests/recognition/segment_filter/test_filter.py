@@ -220,3 +220,27 @@ def test_evidence_of_any_size_leaves_a_belief_that_sums_to_one(ratios, exits, ab
         belief = task_filter.step(pairs(step, given_pairs))
         assert belief.states.sum() + belief.unknown == pytest.approx(1.0)
         assert np.isfinite(belief.log_likelihood)
+
+
+def test_evidence_for_what_is_impossible_changes_nothing():
+    chain = random_chain(np.random.default_rng(0), shared=False)
+    only = chain._replace(initial=np.array([1.0, 0.0]))
+    beliefs = []
+    for ratio in (0.0, 5_000.0):
+        task_filter = SegmentFilter(only, SETTINGS)
+        beliefs.append(task_filter.step(pairs(0, {(0, 0): (0.0, 1.0), (1, 0): (0.0, ratio)})))
+    np.testing.assert_array_equal(beliefs[1].states, beliefs[0].states)
+    assert beliefs[1].unknown == beliefs[0].unknown < 0.5
+
+
+def test_a_filter_that_was_reset_begins_as_a_new_one():
+    rng = np.random.default_rng(3)
+    chain = random_chain(rng)
+    used, new = SegmentFilter(chain, SETTINGS), SegmentFilter(chain, SETTINGS)
+    for item in random_evidence(rng, 4):
+        used.step(item)
+    used.reset()
+    for item in random_evidence(rng, 4):
+        one, other = used.step(item), new.step(item)
+        np.testing.assert_array_equal(one.states, other.states)
+        assert one.unknown == other.unknown

@@ -12,9 +12,10 @@ from hmcs.recognition.segment_filter.sensor_densities import (
     SensorDensities,
     SensorWeights,
     log_densities,
+    sensor_rows,
     variance_floors,
 )
-from hmcs.recognition.segments import LearningError
+from hmcs.recognition.segments import LearningError, segments_of
 
 FORCE_N = {"go": 3.0, "turn": -3.0, "rise": 0.0}
 
@@ -90,3 +91,14 @@ def test_no_phase_is_surer_of_a_sense_than_a_quarter_of_its_spread():
     rows = [rng.normal(0, spread, (400, 3)) for _ in range(20)]
     # What never varies is as sure as the finest device.
     np.testing.assert_allclose(np.sqrt(variance_floors(rows)), [0.025, 1.0, 1e-3], rtol=0.05)
+
+
+def test_the_first_step_turns_as_the_second_does(task, performances):
+    segment = segments_of(task, [felt(performances(["along", "round", "up"], 0), 0)])[0]
+    rows = sensor_rows(segment, ("turn", "force"))
+    assert np.isfinite(rows).all()
+    np.testing.assert_array_equal(rows[0, :3], rows[1, :3])
+    assert np.abs(rows[0, :3]).max() > 1e-3
+    # Of what is felt at a step the first is like any other.
+    assert (rows[0, 3:] != rows[1, 3:]).all()
+    assert sensor_rows(segment, ()).shape == (len(segment.steps), 0)
