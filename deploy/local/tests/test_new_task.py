@@ -27,7 +27,7 @@ def test_what_is_written_is_a_task_as_asked_for(tmp_path: Path, robot: str, plan
     assert dict(task.start) == {"approach": 1.0}
 
 
-@pytest.mark.parametrize("robot", map(arm, PLACES))
+@pytest.mark.parametrize("robot", [arm(name) for name in PLACES])
 def test_the_arm_reaches_where_a_new_task_begins(tmp_path: Path, robot: str) -> None:
     file = tmp_path / "pick.yaml"
     write_new_task(file, STATES, robot, None)
