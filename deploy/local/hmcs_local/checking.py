@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from hmcs.arrays import Array
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
 from hmcs.shown import plain
 from hmcs.task import load_task
 from hmcs_local.tables import show_table
@@ -18,10 +19,12 @@ _NUMBERS = ("Hz", "lasts, s", "way, m")
 _LONGEST = 4000
 
 
-def show_check(references: Sequence[str], task: str, console: Console) -> bool:
+def show_check(
+    references: Sequence[str], task: str, console: Console, choices: Choices = AS_IT_IS
+) -> bool:
     """Show what is known of each demonstration; return whether none would be refused."""
     loaded = load_task(task) if task else None
-    check = check_files(references, loaded)
+    check = check_files(references, loaded, choices)
     if check.judged:
         columns = (*_COLUMNS, *(() if loaded is None else ("workspace",)), "states")
         title = "demonstrations" if loaded is None else f"demonstrations of {loaded.name}"

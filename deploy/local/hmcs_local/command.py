@@ -81,6 +81,8 @@ _IN_ORDER_OF_HELP = (
 )
 for _command in _IN_ORDER_OF_HELP:
     app.command()(_command)
+# `import` is a word of Python's own.
+app.command("import")(demonstrations.import_files)
 add_commands(app)
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from hmcs.errors import UserError
 from hmcs.recordings.file_rotation import SUFFIX as RECORDING
+from hmcs.recordings.foreign.registry import ENDINGS as OTHER_PROGRAMS
+from hmcs.recordings.foreign.registry import is_recording_folder
 from hmcs_trainer.references import DRAWINGS
 
-ENDINGS = (".csv", RECORDING)
+ENDINGS = (".csv", RECORDING, *OTHER_PROGRAMS)
 """Of demonstrations in a folder."""
 LABELS = ".labels.csv"
 """Ending of files that hold the labels of a recording beside them."""
@@ -27,7 +29,7 @@ def expanded(references: Sequence[str]) -> list[str]:
 
 def _files_of(reference: str) -> list[str]:
     path = Path(reference)
-    if reference.startswith(DRAWINGS) or path.is_file():
+    if reference.startswith(DRAWINGS) or path.is_file() or is_recording_folder(path):
         return [reference]
     if path.is_dir():
         files = [str(file) for file in sorted(path.iterdir()) if _is_demonstration(file)]
@@ -48,4 +50,6 @@ def _files_of(reference: str) -> list[str]:
 
 
 def _is_demonstration(file: Path) -> bool:
+    if file.is_dir():
+        return is_recording_folder(file)
     return file.is_file() and file.name.endswith(ENDINGS) and not file.name.endswith(LABELS)

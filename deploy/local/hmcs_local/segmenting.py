@@ -17,6 +17,7 @@ from hmcs.recognition.registry import segmentation_of
 from hmcs.recognition.segmentation import label_of
 from hmcs.recordings.csv_labels import write_csv_labels
 from hmcs.recordings.demonstrations import stretches_of
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
 from hmcs.recordings.generated_marker import is_unchanged_generated
 from hmcs.recordings.labels import labels_beside, write_labels
 from hmcs.shown import plain
@@ -48,6 +49,7 @@ def segment_files(
     out: Path | None,
     anywhere: bool,
     console: Console,
+    choices: Choices = AS_IT_IS,
 ) -> None:
     """Show the segments of each motion and write them as labels, where `out` says where to.
 
@@ -58,7 +60,7 @@ def segment_files(
     segmentation_of(model, ())
     targets = [None] * len(references) if out is None else _targets(references, out)
     for reference, target in zip(references, targets, strict=True):
-        (source,) = read_sources([reference], model.task, labels_count=False)
+        (source,) = read_sources([reference], model.task, labels_count=False, choices=choices)
         found = [segmented(model, each, anywhere=anywhere) for each in source.demonstrations]
         for each in found:
             shown = f"{each.labeled.name}: {_length_s(each.labeled):.1f} s"
@@ -68,6 +70,11 @@ def segment_files(
                 console.print(
                     f"{plain(shown)}, no step of {model.task.dead_zone_m:g} m", markup=False
                 )
+        if target is not None and not source.labels_beside:
+            raise UserError(
+                f"{reference}: is a recording of another program: labels are not written beside "
+                "it; make CSV files of it by `hmcs import`, and segment those"
+            )
         if target is not None:
             _write(source, [each.labeled for each in found], target)
             console.print(f"labels written to {plain(str(target))}", markup=False, highlight=False)

@@ -11,6 +11,7 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.steps import steps_of
 from hmcs.recognition.segments import segments_of
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
 from hmcs.task import Task
 from hmcs_trainer.plausibility import (
     Finding,
@@ -59,7 +60,7 @@ class Check(NamedTuple):
     """What may be wrong, and what to do, the serious first."""
 
 
-def check_files(references: Sequence[str], task: Task | None) -> Check:
+def check_files(references: Sequence[str], task: Task | None, choices: Choices = AS_IT_IS) -> Check:
     """Judge what each reference names; what cannot be read is one serious finding.
 
     Where a task is given, labels are judged by it, and what is labeled as what is trained from
@@ -68,7 +69,7 @@ def check_files(references: Sequence[str], task: Task | None) -> Check:
     sources, found = list[Source](), list[Finding]()
     for reference in references:
         try:
-            sources += read_sources([reference], task)
+            sources += read_sources([reference], task, choices=choices)
         except UserError as error:
             found.append(Finding(True, str(error)))
     sources = told_apart(sources)

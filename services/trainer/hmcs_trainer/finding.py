@@ -69,7 +69,7 @@ def found_states(template: Task, sources: Sequence[Source], name: str) -> Found:
 def check_places(sources: Sequence[Source], task_file: Path) -> None:
     """Raise UserError where what is found would take the place of what somebody wrote."""
     for source in sources:
-        if is_drawing(source.reference):
+        if not source.labels_beside:
             continue
         beside = labels_beside(Path(source.reference))
         if beside.exists() and not is_unchanged_generated(beside):
@@ -95,6 +95,12 @@ def write_found(found: Found, task_file: Path) -> Iterator[str]:
         content, beside = source.recording, labels_beside(Path(source.reference))
         if is_drawing(source.reference):
             yield f"{source.reference}: is a drawing: labels are not written beside it"
+            continue
+        if not source.labels_beside:
+            yield (
+                f"{source.reference}: is a recording of another program: labels are not written "
+                "beside it; make CSV files of it by `hmcs import`, and train from those"
+            )
             continue
         if content is None:
             stretches = stretches_of(source.demonstrations, 0)

@@ -1,4 +1,7 @@
-"""Demonstrations by reference: the path of a CSV file or a recording, or `lasa:SHAPE/NUMBER`."""
+"""Demonstrations by reference: the path of a CSV file or a recording, or `lasa:SHAPE/NUMBER`.
+
+Recordings are our own, or those of other programs, see `hmcs.recordings.foreign`.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,8 @@ from hmcs.motion.lasa import read_drawing
 from hmcs.recordings.csv_labels import read_labeled_csv
 from hmcs.recordings.demonstrations import demonstrations_of, performances_of
 from hmcs.recordings.file_rotation import SUFFIX as RECORDING
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
+from hmcs.recordings.foreign.registry import format_of, take
 from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import RecordingContent, RecordingError, read
 from hmcs.task import Task
@@ -36,9 +41,11 @@ class Source(NamedTuple):
     demonstrations: tuple[Demonstration, ...]
     """One at least."""
     recording: RecordingContent | None
-    """None where it is no recording."""
+    """None where it is no recording of our own."""
     notes: tuple[str, ...] = ()
     """What should be known of it, a sentence each."""
+    labels_beside: bool = True
+    """Whether labels in a file beside it are read."""
 
 
 def is_drawing(reference: str) -> bool:
@@ -56,16 +63,21 @@ def read_references(references: Sequence[str], task: Task) -> list[Demonstration
 
 
 def read_sources(
-    references: Sequence[str], task: Task | None, *, labels_count: bool = True
+    references: Sequence[str],
+    task: Task | None,
+    *,
+    labels_count: bool = True,
+    choices: Choices = AS_IT_IS,
 ) -> list[Source]:
     """Return what each reference names; drawings need a task.
 
     `lasa:SHAPE/FIRST-LAST` names several drawings, a recording may hold several demonstrations:
-    where labels count those that are labeled, else those its operator began anew. Raises
+    where labels count those that are labeled, else those its operator began anew. `choices` say
+    how recordings of other programs and tables with other columns are read. Raises
     DemonstrationError for a reference that names none, RecordingError for a recording that cannot
     be used.
     """
-    return told_apart([_read(reference, task, labels_count) for reference in references])
+    return told_apart([_read(reference, task, labels_count, choices) for reference in references])
 
 
 def distinct(sources: Sequence[Source]) -> tuple[list[Source], list[str]]:
@@ -119,11 +131,15 @@ def told_apart(sources: Sequence[Source]) -> list[Source]:
     ]
 
 
-def _read(reference: str, task: Task | None, labels_count: bool) -> Source:
+def _read(reference: str, task: Task | None, labels_count: bool, choices: Choices) -> Source:
+    form = None if reference.startswith(DRAWINGS) else format_of(Path(reference))
+    if form is not None:
+        taken = take(form, Path(reference), choices)
+        return Source(reference, taken.demonstrations, None, taken.notes, labels_beside=False)
     if reference.endswith(RECORDING):
         return _recorded(reference, labels_count)
     if not reference.startswith(DRAWINGS):
-        labeled = read_labeled_csv(Path(reference))
+        labeled = read_labeled_csv(Path(reference), choices)
         return Source(reference, (labeled.demonstration,), None, labeled.notes)
     match = _DRAWING.fullmatch(reference)
     if match is None:
@@ -137,7 +153,7 @@ def _read(reference: str, task: Task | None, labels_count: bool) -> Source:
     if last < first:
         raise DemonstrationError(f"{reference}: the first number is larger than the last")
     drawings = (read_drawing(match["shape"], k, task) for k in range(first, last + 1))
-    return Source(reference, tuple(drawings), None)
+    return Source(reference, tuple(drawings), None, labels_beside=False)
 
 
 def _recorded(reference: str, labels_count: bool) -> Source:

@@ -16,6 +16,7 @@ from hmcs.recognition.model_file import check_model, save_model
 from hmcs.recognition.registry import DEFAULT, kind_named, settings_of
 from hmcs.recognition.segments import LearningError
 from hmcs.recognition.selection import choose
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
 from hmcs.task import Task, load_task
 from hmcs.write_places import check_file_place
 from hmcs_trainer.advice import advice
@@ -89,6 +90,7 @@ def train(
     find_states: bool = False,
     report: str | Path | None = None,
     accept_implausible: bool = False,
+    choices_of_files: Choices = AS_IT_IS,
     progress: Callable[[str], None] = lambda _: None,
     fits: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Model:
@@ -102,8 +104,9 @@ def train(
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
     as labels beside each file; that task is called `name`, or as the model's file. Demonstrations
     that no hand made are refused unless `accept_implausible`; those that are given twice count
-    once. Raises a UserError that says what is wrong with the task, a reference, a demonstration,
-    the name, the recognizer or a setting.
+    once. `choices_of_files` say how files of other programs are read. Raises a UserError that says
+    what is wrong with the task, a reference, a demonstration, the name, the recognizer or a
+    setting.
     """
     if name is not None:
         check_name("model", name)
@@ -113,7 +116,7 @@ def train(
         check_file_place(Path(report), "the report")
     loaded = load_task(task)
     progress("reading demonstrations")
-    sources, noted = _read(loaded, references, find_states=find_states)
+    sources, noted = _read(loaded, references, choices_of_files, find_states=find_states)
     found, task_file = None, Path(output).with_suffix(".yaml")
     if find_states:
         check_places(sources, task_file)
@@ -170,10 +173,12 @@ def train(
 
 
 def _read(
-    task: Task, references: Sequence[str], *, find_states: bool
+    task: Task, references: Sequence[str], files: Choices = AS_IT_IS, *, find_states: bool
 ) -> tuple[list[Source], list[Finding]]:
     """What the references name, each demonstration once, and what should be known of it."""
-    sources, doubled = distinct(read_sources(references, task, labels_count=not find_states))
+    sources, doubled = distinct(
+        read_sources(references, task, labels_count=not find_states, choices=files)
+    )
     noted = [Finding(False, sentence) for sentence in doubled]
     for source in sources:
         noted += [Finding(False, note) for note in source.notes]

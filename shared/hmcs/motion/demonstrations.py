@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
@@ -109,11 +109,16 @@ def read_csv(path: str | Path) -> Demonstration:
     return read_with_others(path).demonstration
 
 
-def read_with_others(path: str | Path) -> ReadCsv:
-    """Read a demonstration as `read_csv` does, with the names of the columns that were not read."""
+def read_with_others(
+    path: str | Path, mapped: Callable[[CsvTable], CsvTable] = lambda table: table
+) -> ReadCsv:
+    """Read a demonstration as `read_csv` does, with the names of the columns that were not read.
+
+    `mapped` returns a table of other columns as one of those above.
+    """
     file = Path(path)
     try:
-        table = table_in(_text(file))
+        table = mapped(table_in(_text(file)))
         columns = _columns(file, table)
         rows = list(_rows(file, table, columns))
     except BadTableError as error:

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 from hmcs.motion.demonstrations import Demonstration, DemonstrationError, read_with_others
 from hmcs.recordings.fingerprints import Fingerprint
+from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
+from hmcs.recordings.foreign.mapped_csv import Mapped
 from hmcs.recordings.generated_marker import with_generated_marker
 from hmcs.recordings.label_files import labels_text, read_labels
 from hmcs.recordings.labels import SUFFIX, labels_beside
@@ -32,18 +34,21 @@ class LabeledCsv(NamedTuple):
     """What should be known of its columns and of the labels beside it, a sentence each."""
 
 
-def read_labeled_csv(file: Path) -> LabeledCsv:
+def read_labeled_csv(file: Path, choices: Choices = AS_IT_IS) -> LabeledCsv:
     """Read a demonstration and the labels beside it.
 
-    Raises DemonstrationError as `read_csv` does and for a file of labels in its place,
-    RecordingError as `read_labels` does, and LabelError for labels that cannot be of it.
+    Columns of other names and units are read as `choices` or the header says. Raises
+    DemonstrationError as `read_csv` does and for a file of labels in its place, RecordingError as
+    `read_labels` does, and LabelError for labels that cannot be of it.
     """
     if file.name.endswith(SUFFIX):
         raise DemonstrationError(
             f"{file}: is a file of labels: name the demonstration beside it, whose labels they are"
         )
-    (demonstration, ignored), beside = read_with_others(file), labels_beside(file)
-    notes = [f"{file.name}: not read: column {', '.join(map(repr, ignored))}"] if ignored else []
+    mapped, beside = Mapped(file, choices), labels_beside(file)
+    demonstration, ignored = read_with_others(file, mapped)
+    notes = list(mapped.notes)
+    notes += [f"{file.name}: not read: column {', '.join(map(repr, ignored))}"] if ignored else []
     if not beside.is_file():
         return LabeledCsv(demonstration, tuple(notes))
     written = read_labels(beside, 0)

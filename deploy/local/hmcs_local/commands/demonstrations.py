@@ -1,4 +1,4 @@
-"""Judge and take apart what was demonstrated: `check`, `segment`."""
+"""Read, judge and take apart what was demonstrated: `import`, `check`, `segment`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-FILES = "CSV files, MCAP recordings, folders of them, patterns, lasa:SHAPE/NUMBER."
+from hmcs_local.commands.options import Columns, Link, Marks, Times, Topics, Units, Urdf
+
+FILES = (
+    "CSV files, recordings, bags of ROS, LeRobot data sets, folders of them, patterns, "
+    "lasa:SHAPE/NUMBER."
+)
 
 
 def segment(
@@ -27,16 +32,35 @@ def segment(
     anywhere: Annotated[
         bool, typer.Option("--anywhere", help="The motion may begin in any state of the task.")
     ] = False,
+    topics: Topics = None,
+    columns: Columns = "",
+    units: Units = None,
+    time: Times = "",
+    urdf: Urdf = None,
+    link: Link = "",
+    marks: Marks = "",
 ) -> None:
     """Find the segments of whole motions: which part of the task each moment was.
 
     What came after a moment counts as well as what came before. The probability is that of the
     state, all of the motion given, in the mean over the segment.
     """
+    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.segmenting import segment_files
 
-    segment_files(expanded(files), model, out=out, anywhere=anywhere, console=Console())
+    choices = choices_of(
+        topics=topics or (),
+        columns=columns,
+        units=units or (),
+        time=time,
+        urdf=urdf,
+        link=link,
+        marks=marks,
+    )
+    segment_files(
+        expanded(files), model, out=out, anywhere=anywhere, console=Console(), choices=choices
+    )
 
 
 def check(
@@ -44,12 +68,65 @@ def check(
     task: Annotated[
         str, typer.Option(metavar="TASK", help="A shipped task's name or a task file, if known.")
     ] = "",
+    topics: Topics = None,
+    columns: Columns = "",
+    units: Units = None,
+    time: Times = "",
+    urdf: Urdf = None,
+    link: Link = "",
+    marks: Marks = "",
 ) -> None:
     """Judge demonstrations: units, rate, length, extent, workspace, states, and what to do.
 
     The exit code is 2 where `hmcs train` would refuse one.
     """
+    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.checking import show_check
     from hmcs_local.demonstration_files import expanded
 
-    raise typer.Exit(0 if show_check(expanded(files), task, Console()) else 2)
+    choices = choices_of(
+        topics=topics or (),
+        columns=columns,
+        units=units or (),
+        time=time,
+        urdf=urdf,
+        link=link,
+        marks=marks,
+    )
+    raise typer.Exit(0 if show_check(expanded(files), task, Console(), choices) else 2)
+
+
+def import_files(
+    sources: Annotated[list[str], typer.Argument(help=FILES)],
+    to: Annotated[
+        Path,
+        typer.Option(metavar="CSV|DIR", help="A file for one demonstration; a folder for several."),
+    ],
+    topics: Topics = None,
+    columns: Columns = "",
+    units: Units = None,
+    time: Times = "",
+    urdf: Urdf = None,
+    link: Link = "",
+    marks: Marks = "",
+) -> None:
+    """Make CSV files, as `hmcs train` reads them, of what other programs recorded.
+
+    Bags of ROS 1 and 2, MCAP files, LeRobot data sets, CSV files with other columns. What is taken
+    for what is said on stderr. Files that are there already are not replaced.
+    """
+    from hmcs.recordings.foreign.choices import choices_of
+    from hmcs_local.demonstration_files import expanded
+    from hmcs_local.importing import import_as_csv
+
+    choices = choices_of(
+        topics=topics or (),
+        columns=columns,
+        units=units or (),
+        time=time,
+        urdf=urdf,
+        link=link,
+        marks=marks,
+    )
+    for note in import_as_csv(expanded(sources), to, choices, typer.echo):
+        typer.echo(note, err=True)

@@ -37,6 +37,47 @@ Folder = Annotated[
     Path, typer.Option(metavar="DIR", help="Where `hmcs up` keeps logs, models and recordings.")
 ]
 
+Topics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--topic",
+        metavar="NAME",
+        help="What to read of a bag or an MCAP file: the motion, the force, the buttons; a feature "
+        "of a LeRobot data set. May be repeated. What is the only one of its kind is found.",
+    ),
+]
+Columns = Annotated[
+    str,
+    typer.Option(
+        metavar="ROLE=NAME,…",
+        help="Columns of a CSV file with other names, or numbers of a feature: time=stamp,x=tcp_x. "
+        "Roles: time x y z qx qy qz qw fx fy fz tx ty tz state.",
+    ),
+]
+Units = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--unit",
+        metavar="m|cm|mm|um|in|rad|deg",
+        help="Of positions; of joint positions, rad or deg.",
+    ),
+]
+Times = Annotated[
+    str, typer.Option("--time", metavar="s|ms|us|ns|iso", help="Unit of a CSV file's times.")
+]
+Urdf = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="The robot whose joint positions were recorded."),
+]
+Link = Annotated[str, typer.Option(metavar="LINK", help="Of it, that is the tool.")]
+Marks = Annotated[
+    str,
+    typer.Option(
+        metavar="BUTTON=STATE,…",
+        help="States that begin where a joystick's button is pressed: 0=approach,1=insert.",
+    ),
+]
+
 
 def setting(item: str) -> tuple[str, str]:
     """Split NAME=VALUE, and raise UserError where it is not of this form."""

@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 from hmcs.bus.config import DEFAULT_ROUTER
-from hmcs_local.commands.options import Cell, Router, Secure, setting
+from hmcs_local.commands.options import (
+    Cell,
+    Columns,
+    Link,
+    Marks,
+    Router,
+    Secure,
+    Times,
+    Topics,
+    Units,
+    Urdf,
+    setting,
+)
 from hmcs_local.commands.replies import tell_replies
 
 
@@ -17,8 +29,8 @@ def train(
     demonstrations: Annotated[
         list[str],
         typer.Argument(
-            help="CSV files, MCAP recordings, folders of them, patterns, lasa:SHAPE/NUMBER, "
-            "lasa:SHAPE/FIRST-LAST."
+            help="CSV files, recordings, bags of ROS, LeRobot data sets, folders, patterns, "
+            "lasa:SHAPE/NUMBER, lasa:SHAPE/FIRST-LAST."
         ),
     ],
     output: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
@@ -58,6 +70,13 @@ def train(
             help="Learn even from what no hand seems to have made: jumps, other units.",
         ),
     ] = False,
+    topics: Topics = None,
+    columns: Columns = "",
+    units: Units = None,
+    time: Times = "",
+    urdf: Urdf = None,
+    link: Link = "",
+    marks: Marks = "",
 ) -> None:
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
@@ -65,10 +84,20 @@ def train(
     taken for each other, how far demonstrations lay apart, and what would help. States that are
     found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
+    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
 
+    files = choices_of(
+        topics=topics or (),
+        columns=columns,
+        units=units or (),
+        time=time,
+        urdf=urdf,
+        link=link,
+        marks=marks,
+    )
     alternatives = {name: value.split(",") for name, value in map(setting, choices or [])}
     with fits_shown(bool(alternatives)) as fits:
         model = learn(
@@ -83,6 +112,7 @@ def train(
             find_states=find_states,
             report=output.with_suffix(".html") if report and output.name else None,
             accept_implausible=accept_implausible,
+            choices_of_files=files,
             progress=typer.echo,
             fits=fits,
         )

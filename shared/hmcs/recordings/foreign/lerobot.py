@@ -1,0 +1,319 @@
+"""Data sets of LeRobot, versions 2.1 and 3.0: one demonstration for every episode.
+
+A folder with `meta/info.json` and tables in Parquet under `data/`. Positions are numbers of one
+feature, e.g. `observation.state`, by their names in `meta/info.json`, or follow from its joint
+positions by a URDF. Pictures are not looked at.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hmcs.arrays import Array
+from hmcs.bounded_files import read_bounded
+from hmcs.motion.demonstrations import Demonstration
+from hmcs.motion.forward_kinematics import Chain, poses, read_chain
+from hmcs.recordings.demonstrations import MOST_DEMONSTRATIONS, MOST_SAMPLES
+from hmcs.recordings.foreign.choices import METERS, RADIANS, Choices
+from hmcs.recordings.foreign.columns import FORCE, PLACE, TURN, columns_in
+from hmcs.recordings.foreign.ros_types import missing
+from hmcs.recordings.foreign.tracks import Track, demonstration_of
+from hmcs.recordings.reading import RecordingError
+from hmcs.recordings.stretches import NS_PER_S
+
+INFO = Path("meta") / "info.json"
+MOST_INFO_BYTES = 16 * 1024 * 1024
+MOST_FILES = 10_000
+LARGEST_TABLE_BYTES = 2 * 1024**3
+"""Of the columns that are read of one file, unpacked."""
+MOST_NUMBERS = 512
+"""Of a feature."""
+FEATURES = ("observation.state", "action")
+"""Of which the first that is there is taken by itself."""
+STATE = "state"
+"""A feature with the task state of each frame, as `hmcs export` writes it."""
+_BATCH_ROWS = 65_536
+_JOINT_ENDINGS = (".pos", "_pos", ".position", "_position")
+
+
+class _Feature(NamedTuple):
+    name: str
+    names: tuple[str, ...]
+    """Of its numbers."""
+
+
+class _Frames(NamedTuple):
+    """The frames of one episode."""
+
+    episode: int
+    time_s: list[float]
+    values: list[Array]
+    states: list[str | None]
+
+
+def episodes_in(folder: Path, choices: Choices) -> tuple[list[Demonstration], tuple[str, ...]]:
+    """Return a demonstration for every episode, and what was taken for it.
+
+    Raises RecordingError for a folder that is no such data set, for a feature that is not there or
+    whose numbers are not named, and for a frame that is none.
+    """
+    info = _info(folder)
+    feature = _feature(folder, info, choices)
+    where = f"{folder}: {feature.name}"
+    placed, said = _placed(where, feature, choices)
+    labeled = STATE in info["features"]
+    shown, notes = list[Demonstration](), [said]
+    for frames in _episodes(folder, feature, labeled):
+        if len(shown) == MOST_DEMONSTRATIONS:
+            raise RecordingError(f"{folder}: more than {MOST_DEMONSTRATIONS} episodes")
+        episode = f"{where}, episode {frames.episode}"
+        own, noted = _demonstration(f"{folder.name}#{frames.episode}", episode, frames, placed)
+        shown.append(own)
+        notes += noted
+    if not shown:
+        raise RecordingError(f"{folder}: has no frame under data/: was it copied whole?")
+    return shown, tuple(notes)
+
+
+class _Placed(NamedTuple):
+    """How numbers of a feature become poses and forces."""
+
+    place: tuple[int, ...]
+    size_m: float
+    turn: tuple[int, ...]
+    force: tuple[int, ...]
+    chain: Chain | None
+    joints: tuple[str, ...]
+    scale: tuple[float, ...]
+    """Of the joints' positions."""
+
+    def motion(self, values: Array) -> Array:
+        if self.chain is not None:
+            indices = list(self.place)
+            return np.hstack(poses(self.chain, self.joints, values[:, indices] * self.scale))
+        places = values[:, list(self.place)] * self.size_m
+        if places.shape[1] < 3:
+            places = np.hstack([places, np.zeros((len(places), 1))])
+        return np.hstack([places, values[:, list(self.turn)]])
+
+
+def _placed(where: str, feature: _Feature, choices: Choices) -> tuple[_Placed, str]:
+    if choices.urdf is not None:
+        return _by_joints(where, feature, choices, read_chain(choices.urdf, choices.link))
+    columns = columns_in(feature.names, choices, where)
+    if not {"x", "y"} <= columns.keys():
+        raise RecordingError(
+            f"{where}: which of its numbers are the position of the tool? Say by --columns "
+            f"x=NAME,y=NAME,z=NAME, or name the robot by --urdf FILE; they are named "
+            f"{', '.join(feature.names[:40])}"
+        )
+    place = tuple(columns[axis].at for axis in PLACE if axis in columns)
+    turn, force = (
+        tuple(columns[part].at for part in parts) if set(parts) <= columns.keys() else ()
+        for parts in (TURN, FORCE)
+    )
+    unit = choices.length or next((columns[a].unit for a in PLACE if a in columns), "") or "m"
+    if unit not in METERS:
+        raise RecordingError(f"{where}: positions in {unit!r}: say their unit by --unit")
+    taken = ", ".join(f"{role}={column.name}" for role, column in columns.items())
+    said = f"{where}: {taken}; positions in {unit}"
+    return _Placed(place, METERS[unit], turn, force, None, (), ()), said
+
+
+def _by_joints(
+    where: str, feature: _Feature, choices: Choices, chain: Chain
+) -> tuple[_Placed, str]:
+    names = [_joint_name(name) for name in feature.names]
+    absent = [name for name in chain.names if name not in names]
+    if absent:
+        raise RecordingError(
+            f"{where}: the chain to link {chain.link!r} of {chain.file} needs the joints "
+            f"{', '.join(absent[:20])}; its numbers are named {', '.join(feature.names[:40])}"
+        )
+    place = tuple(names.index(name) for name in chain.names)
+    angle, length = choices.angle or "rad", choices.length or "m"
+    scale = tuple(
+        RADIANS[angle] if name in chain.turning else METERS[length] for name in chain.names
+    )
+    said = f"{where}: joint positions in {angle}, of link {chain.link!r} of {chain.file}"
+    return _Placed(place, 1.0, (), (), chain, chain.names, scale), said
+
+
+def _joint_name(name: str) -> str:
+    return next((name.removesuffix(end) for end in _JOINT_ENDINGS if name.endswith(end)), name)
+
+
+def _demonstration(
+    name: str, where: str, frames: _Frames, placed: _Placed
+) -> tuple[Demonstration, list[str]]:
+    values = np.array(frames.values)
+    time_ns = np.round((np.array(frames.time_s) - frames.time_s[0]) * NS_PER_S).astype(np.int64)
+    back = np.flatnonzero(np.diff(time_ns) <= 0)
+    if len(back):
+        raise RecordingError(
+            f"{where}: frame {back[0] + 1} is not later than the one before: times must rise"
+        )
+    wrong = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(wrong):
+        raise RecordingError(
+            f"{where}: frame {wrong[0]} has a number that is not finite: take the episode out"
+        )
+    force = Track(time_ns, values[:, list(placed.force)]) if placed.force else None
+    motion = Track(time_ns, placed.motion(values))
+    shown, notes = demonstration_of(name, where, motion, force)
+    return shown._replace(states=tuple(frames.states)), notes
+
+
+def _info(folder: Path) -> Mapping[str, Any]:
+    file = folder / INFO
+    try:
+        info = json.loads(read_bounded(file, MOST_INFO_BYTES))
+        version, features = str(info["codebase_version"]), info["features"]
+        if not version.startswith(("v2.", "v3.")):
+            raise RecordingError(
+                f"{file}: is of version {version[:20]!r}, expected v2.1 or v3.0: convert it with "
+                "LeRobot"
+            )
+        if not all(isinstance(each, dict) for each in features.values()):
+            raise TypeError("features")
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise RecordingError(
+            f"{file}: does not describe a data set of LeRobot ({type(error).__name__}: "
+            f"{str(error)[:80]})"
+        ) from error
+    return info  # type: ignore[no-any-return]
+
+
+def _feature(folder: Path, info: Mapping[str, Any], choices: Choices) -> _Feature:
+    features: Mapping[str, Any] = info["features"]
+    vectors = [name for name in features if _width(features[name])]
+    if len(choices.topics) > 1:
+        raise RecordingError(f"{folder}: --topic names one feature of it: {', '.join(vectors)}")
+    wanted = choices.topics[0] if choices.topics else next(
+        (name for name in FEATURES if name in vectors), ""
+    )  # fmt: skip
+    if wanted not in vectors:
+        raise RecordingError(
+            f"{folder}: has no feature {wanted or ' or '.join(FEATURES)!r} of numbers; name one by "
+            f"--topic: {', '.join(vectors[:40]) or 'there is none'}"
+        )
+    names = _names(features[wanted].get("names"))
+    width = _width(features[wanted])
+    if len(names) != width:
+        names = tuple(str(number) for number in range(width))
+    return _Feature(wanted, names)
+
+
+def _width(feature: Mapping[str, Any]) -> int:
+    """How many numbers a feature has; 0 for pictures and texts."""
+    shape = feature.get("shape")
+    numbers = str(feature.get("dtype", "")).startswith("float")
+    if not (isinstance(shape, list) and len(shape) == 1 and isinstance(shape[0], int)):
+        return 0
+    return shape[0] if numbers and 1 < shape[0] <= MOST_NUMBERS else 0
+
+
+def _names(told: Any) -> tuple[str, ...]:
+    """Names of numbers: a list, or lists by what they are of."""
+    if isinstance(told, dict):
+        return tuple(name for each in told.values() for name in _names(each))
+    return tuple(str(each) for each in told) if isinstance(told, list) else ()
+
+
+def _episodes(folder: Path, feature: _Feature, labeled: bool) -> Iterator[_Frames]:
+    """The frames of each episode, in the order in which they stand in the files."""
+    current: _Frames | None = None
+    seen = set[int]()
+    rows = enumerate(_rows(folder, feature, labeled))
+    for count, (episode, at_s, values, state) in rows:
+        if count >= MOST_SAMPLES:
+            raise RecordingError(f"{folder}: more than {MOST_SAMPLES} frames: take a part of it")
+        if current is None or episode != current.episode:
+            if current is not None:
+                yield current
+            if episode in seen:
+                raise RecordingError(f"{folder}: frames of episode {episode} stand apart")
+            seen.add(episode)
+            current = _Frames(episode, [], [], [])
+        current.time_s.append(at_s)
+        current.values.append(values)
+        current.states.append(state or None)
+    if current is not None:
+        yield current
+
+
+def _rows(
+    folder: Path, feature: _Feature, labeled: bool
+) -> Iterator[tuple[int, float, Array, str | None]]:
+    try:
+        import pyarrow as arrow
+        import pyarrow.parquet as parquet
+    except ImportError as error:
+        raise missing("lerobot", f"{folder}: is read by pyarrow, which is not here") from error
+    files = sorted((folder / "data").glob("chunk-*/*.parquet"))[: MOST_FILES + 1]
+    if len(files) > MOST_FILES:
+        raise RecordingError(f"{folder}: more than {MOST_FILES} files under data/")
+    wanted = ["episode_index", "timestamp", feature.name, *([STATE] if labeled else [])]
+    for file in files:
+        try:
+            with parquet.ParquetFile(file) as table:
+                _check_table(file, table, wanted)
+                for batch in table.iter_batches(_BATCH_ROWS, columns=wanted, use_threads=False):
+                    yield from _of_batch(file, batch, feature, labeled)
+        except (arrow.ArrowException, OSError, MemoryError) as error:
+            raise RecordingError(
+                f"{file}: cannot be read ({str(error)[:200] or type(error).__name__}): was it "
+                "copied whole? Fetch it again"
+            ) from error
+
+
+def _check_table(file: Path, table: Any, wanted: Sequence[str]) -> None:
+    absent = [name for name in wanted if name not in table.schema_arrow.names]
+    if absent:
+        raise RecordingError(
+            f"{file}: has no column {absent[0]!r}; it has "
+            f"{', '.join(table.schema_arrow.names[:40])}"
+        )
+    if table.metadata.num_rows > MOST_SAMPLES:
+        raise RecordingError(f"{file}: more than {MOST_SAMPLES} frames")
+    groups = (table.metadata.row_group(k) for k in range(table.metadata.num_row_groups))
+    size = 0
+    for group in groups:
+        for k in range(group.num_columns):
+            column = group.column(k)
+            if column.path_in_schema.startswith(tuple(wanted)):
+                size += column.total_uncompressed_size
+    if size > LARGEST_TABLE_BYTES:
+        raise RecordingError(f"{file}: its numbers unpack to {size / 1e9:.1f} GB")
+
+
+def _of_batch(
+    file: Path, batch: Any, feature: _Feature, labeled: bool
+) -> Iterator[tuple[int, float, Array, str | None]]:
+    episodes = batch.column("episode_index").to_pylist()
+    times = batch.column("timestamp").to_pylist()
+    vectors = batch.column(feature.name).to_pylist()
+    states = batch.column(STATE).to_pylist() if labeled else [None] * len(episodes)
+    width = len(feature.names)
+    for row, (episode, at_s, vector, state) in enumerate(
+        zip(episodes, times, vectors, states, strict=True)
+    ):
+        at_s, episode = _one(at_s), _one(episode)
+        if not isinstance(vector, list) or len(vector) != width or None in vector:
+            raise RecordingError(
+                f"{file}: row {row}: {feature.name} has not the {width} numbers that {INFO} says"
+            )
+        if not isinstance(episode, int) or at_s is None or not math.isfinite(at_s):
+            raise RecordingError(f"{file}: row {row}: has no episode or no finite timestamp")
+        yield episode, float(at_s), np.array(vector, dtype=float), state and str(_one(state))
+
+
+def _one(value: Any) -> Any:
+    """A number that some versions keep as a list of one."""
+    return value[0] if isinstance(value, list) and len(value) == 1 else value
