@@ -1,8 +1,10 @@
-"""Files that are there whole or not at all."""
+"""Files and folders that are there whole or not at all."""
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,3 +23,21 @@ def written_whole(target: Path) -> Iterator[Path]:
         unfinished.replace(target)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def folder_written_whole(target: Path) -> Iterator[Path]:
+    """Yield the folder in which to make what is to become `target`, by the same name.
+
+    It takes its place once the block has ended; where the block raises, nothing is left of it.
+    Raises FileExistsError where there is something of that name already.
+    """
+    if os.path.lexists(target):
+        raise FileExistsError(errno.EEXIST, "is there already: name another folder", str(target))
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    beside.mkdir(parents=True)
+    try:
+        yield beside
+        (beside / target.name).rename(target)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)

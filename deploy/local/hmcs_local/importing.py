@@ -17,6 +17,7 @@ from hmcs_trainer.references import is_drawing, read_sources
 _CSV = ".csv"
 _LONGEST_NAME = 100
 _LONGEST_NOTE = 4000
+_ENDING = re.compile(r"\.(csv|bag|db3|mcap)$", re.IGNORECASE)
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]")
 
 
@@ -67,7 +68,7 @@ def _names(wanted: Sequence[str]) -> Iterator[str]:
     """Yield a file's name for each demonstration, each another one."""
     taken = set[str]()
     for each in wanted:
-        stem = each.rpartition("/")[2].removesuffix(_CSV)
+        stem = _ENDING.sub("", each.rpartition("/")[2])
         base = _NOT_IN_NAMES.sub("-", stem).strip(".")[:_LONGEST_NAME] or "demonstration"
         name, number = base, 1
         # Some file systems do not tell capitals from small letters.

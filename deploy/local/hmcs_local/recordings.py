@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from hmcs.errors import UserError
+from hmcs.recordings.demonstrations import demonstrations_of
 from hmcs.recordings.exporting import Format, export
+from hmcs.recordings.foreign.bag_writing import write_bag
+from hmcs.recordings.foreign.lerobot_writing import write_data_set
 from hmcs.recordings.inspection import Inspection, inspected
 from hmcs.recordings.json_codec import readable_as
 from hmcs.recordings.labels import label_notes, labels_of
@@ -66,6 +70,26 @@ def export_recording(file: Path, folder: Path, form: Format, console: Console) -
             console.print(str(written), markup=False)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+
+
+def export_to_others(
+    file: Path, folder: Path, form: Literal["lerobot", "rosbag2"], fps: int, console: Console
+) -> None:
+    """Write a recording as the folder of a LeRobot data set or of a bag of ROS 2.
+
+    Raises UserError where there is such a folder, or it cannot be written.
+    """
+    content = read(file)
+    try:
+        if form == "rosbag2":
+            said = f"{write_bag(content, folder)} messages"
+        else:
+            shown = demonstrations_of(content)
+            frames = write_data_set(shown, folder, file.stem, fps=fps)
+            said = f"{len(shown)} episode(s), {frames} frames"
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written to: {error.strerror or error}") from error
+    console.print(f"{folder}: {said}", markup=False)
 
 
 def _say(console: Console, line: str) -> None:

@@ -103,17 +103,32 @@ def export(
     recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
     to: Annotated[Path, typer.Option(metavar="DIR", help="The folder the files are written to.")],
     form: Annotated[
-        str, typer.Option("--format", metavar="csv|npz", help="Tables, or NumPy arrays.")
+        str,
+        typer.Option(
+            "--format",
+            metavar="csv|npz|lerobot|rosbag2",
+            help="Tables, NumPy arrays, a LeRobot data set of its demonstrations, a bag of ROS 2.",
+        ),
     ] = "csv",
+    fps: Annotated[
+        int, typer.Option(metavar="HZ", min=1, max=1000, help="Frames a second, for lerobot.")
+    ] = 30,
 ) -> None:
-    """Write a recording as a CSV file, or a file of NumPy arrays, for every channel."""
-    from hmcs_local.recordings import export_recording
+    """Write a recording for other programs.
 
-    if form not in ("csv", "npz"):
-        raise UserError(f"--format {form}: expected csv or npz")
-    export_recording(
-        recording, to, "csv" if form == "csv" else "npz", Console(highlight=False, soft_wrap=True)
-    )
+    As CSV or as NumPy arrays a file for every channel; as `lerobot` (v2.1) or `rosbag2` (MCAP)
+    one folder, which must not be there yet.
+    """
+    from hmcs_local.recordings import export_recording, export_to_others
+
+    console = Console(highlight=False, soft_wrap=True)
+    match form:
+        case "csv" | "npz":
+            export_recording(recording, to, form, console)
+        case "lerobot" | "rosbag2":
+            export_to_others(recording, to, form, fps, console)
+        case _:
+            raise UserError(f"--format {form}: expected csv, npz, lerobot or rosbag2")
 
 
 def replay(
