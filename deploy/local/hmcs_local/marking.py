@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import time
 
-from hmcs.bus.messages import Label, LastStepsQuestion
+from hmcs.bus.messages import Ask, Label, LastStepsQuestion
 from hmcs.bus.session import Bus
-from hmcs.bus.verbs import LAST_STEPS
+from hmcs.bus.verbs import DESCRIBE, LAST_STEPS
+from hmcs.errors import UserError
 from hmcs.shown import plain
+from hmcs.task.values import unknown_name_message
 from hmcs_local.asking import NobodyAnswersError
 
 HEARD_S = 1.0
 """So long is waited for somebody who writes it down."""
 
 
+def _check_known(bus: Bus, state: str) -> None:
+    """Raise UserError where robots say which states their task has and this is none of them."""
+    answers = DESCRIBE.ask(bus, Ask(), service="robot")
+    listed = (answer.body.facts.get("states", "") for answer in answers)
+    known = [name for names in listed for name in names.split(", ") if name]
+    # A label may name the gesteme as well, STATE/GESTEME; an empty one ends what was marked.
+    if state and known and state.partition("/")[0] not in known:
+        raise UserError(unknown_name_message("state", state, dict.fromkeys(known)))
+
+
 def mark(bus: Bus, state: str) -> str:
     """Say that the hand is in `state` from its next step on; return what was said.
 
     Where several input devices make steps it is said from this moment on: which of them is the hand
-    cannot be known. Raises NobodyAnswersError where nobody listens.
+    cannot be known. Raises UserError for a state that the task of the robots does not have,
+    NobodyAnswersError where nobody listens.
     """
+    _check_known(bus, state)
     labels = bus.publisher(Label, bus.keys.label)
     answers = LAST_STEPS.ask(bus, LastStepsQuestion(count=1))
     next_steps = {a.body.clock: a.body.steps[-1].index + 1 for a in answers if a.body.steps}

@@ -114,6 +114,7 @@ class Robot(Service):
         return {
             "robot": self._task.robot.name,
             "task": self._task.name,
+            "states": ", ".join(state.name for state in self._task.states),
             "engine": self._room.engine,
             "physics_rate_hz": f"{self.settings.physics_rate_hz:g}",
             "speed_limit_m_s": f"{self._task.robot.speed_limit_m_s:g}",

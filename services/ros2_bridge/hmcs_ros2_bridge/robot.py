@@ -129,6 +129,7 @@ class RosRobot(Service):
         return {
             "robot": self._task.robot.name,
             "task": self._task.name,
+            "states": ", ".join(state.name for state in self._task.states),
             "commands": self.settings.command_topic,
             "refused_reports": str(self._arm.refused),
             "braking_per_s": f"{self._limits.braking_per_s:.2f}",
