@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import re
 import secrets
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, NoReturn, Self, TypeVar
@@ -23,6 +25,9 @@ ENVIRONMENT_PREFIX = "HMCS_"
 EMPTY_IS_NONE = BeforeValidator(lambda value: None if value == "" else value)
 """Of a setting that may be left out: an environment variable that is set to nothing sets nothing.
 """
+
+
+_FACTORY = re.compile(r"\s*\(default factory: [^()]*\)")
 
 
 class SettingsError(UserError):
@@ -115,12 +120,15 @@ def load_settings(
     Raises SettingsError for unknown options, unknown or invalid values from any source, and a file
     that cannot be read; SystemExit(0) after printing `--help`.
     """
-    parser = _Parser(prog=program, description=settings_type.__doc__, allow_abbrev=False)
+    parser = _Parser(
+        prog=_started_as(program), description=settings_type.__doc__, allow_abbrev=False
+    )
     parser.add_argument("--settings", type=Path, metavar="FILE", help="YAML file of settings")
     parser.add_argument(
         "--print-settings", action="store_true", help="print the settings in force as YAML and end"
     )
     command_line = CliSettingsSource[Any](settings_type, root_parser=parser)
+    parser.leave_factories_out()
     arguments = parser.parse_args(argv)
     try:
         environment = EnvSettingsSource(settings_type)()
@@ -145,7 +153,19 @@ def as_yaml(settings: ServiceSettings) -> str:
     return yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
+def _started_as(program: str) -> str:
+    """How a user starts this process: by its module where it is one of this program's own."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    module = "" if spec is None else spec.name.removesuffix(".__main__")
+    return f"python -m {module}" if program in module else program
+
+
 class _Parser(argparse.ArgumentParser):
+    def leave_factories_out(self) -> None:
+        """Leave out of the help how a default is made: its text says what it is."""
+        for action in self._actions:
+            action.help = _FACTORY.sub("", action.help) if action.help else action.help
+
     def error(self, message: str) -> NoReturn:
         options = sorted(name for name in self._option_string_actions if name.startswith("--"))
         raise SettingsError(f"command line: {message} (valid options: {', '.join(options)})")

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Literal
 
 import pytest
@@ -147,3 +149,15 @@ def test_an_empty_file_changes_nothing(file) -> None:
 
 def test_what_is_printed_holds_every_setting() -> None:
     assert set(yaml.safe_load(as_yaml(load()))) == set(ProbeSettings.model_fields)
+
+
+def test_the_help_says_how_it_is_started_and_not_how_a_default_is_made() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "hmcs_recorder", "--help"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.startswith("usage: python -m hmcs_recorder ")
+    words = " ".join(done.stdout.split())
+    assert "default factory" not in words
+    assert "a short random name by default." in words
+    assert "(default: 512.0)" in words
