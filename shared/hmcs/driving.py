@@ -2,17 +2,22 @@
 
 The fixture controller applies it to every sample and publishes what it decided (`Pairing`).
 Recognizers follow that; where no fixture controller is there they apply the same rule to steps, and
-recordings are read by it. Pure: times are passed in, s of one monotonic clock.
+recordings are read by it. Times are passed in, s of one monotonic clock.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 TAKEOVER_S = 0.5
 """Another takes over once the present one has been silent, or its dead-man up, for so long."""
+PAIRING_FRESH_S = 1.0
+"""A pairing that was not said again for so long binds nobody any more."""
+PAIRINGS_KEPT = 16
+"""Fixture controllers whose pairing is remembered."""
 STANDBY_DEVICES = 16
 """Of so many other devices it is remembered whether their dead-man is down."""
 
@@ -62,6 +67,25 @@ def heard_device(now: Device, now_s: float, boot: str, instance: str, *, pressed
     while len(standby) > STANDBY_DEVICES:
         del standby[next(iter(standby))]
     return replace(now, standby=MappingProxyType(standby))
+
+
+class Pairings:
+    """Which robot each fixture controller said last that it drives; a robot asks it."""
+
+    def __init__(self) -> None:
+        self._said: OrderedDict[str, tuple[str, float]] = OrderedDict()
+
+    def heard(self, writer: str, robot: str, now_s: float) -> None:
+        """Take in that the boot `writer` drives the boot `robot`."""
+        self._said[writer] = (robot, now_s)
+        self._said.move_to_end(writer)
+        if len(self._said) > PAIRINGS_KEPT:
+            self._said.popitem(last=False)
+
+    def other_than(self, own: str, writer: str, now_s: float) -> str:
+        """Return the boot of another robot than `own` that a writer drives; empty for none."""
+        robot, said_s = self._said.get(writer, ("", 0.0))
+        return "" if robot == own or now_s - said_s > PAIRING_FRESH_S else robot
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmcs.driving import (
+    PAIRING_FRESH_S,
+    PAIRINGS_KEPT,
     STANDBY_DEVICES,
     TAKEOVER_S,
     Device,
     FollowingRobot,
+    Pairings,
     heard_device,
     heard_robot,
 )
@@ -116,3 +119,25 @@ def test_a_robot_that_started_anew_under_its_name_follows_once_the_old_one_is_si
     robot = heard_robot(FollowingRobot(), 0.0, "A", "one", {"one"})
     assert heard_robot(robot, 0.1, "B", "one", {"one"}).boot == "A"
     assert heard_robot(robot, 0.6, "B", "one", {"one"}).boot == "B"
+
+
+def test_a_robot_knows_which_writer_drives_another_one_and_for_how_long() -> None:
+    pairings = Pairings()
+    assert pairings.other_than("me", "f", 0.0) == ""
+    pairings.heard("f", "other", 1.0)
+    assert pairings.other_than("me", "f", 1.0 + PAIRING_FRESH_S) == "other"
+    assert pairings.other_than("other", "f", 1.0) == ""
+    assert pairings.other_than("me", "f", 1.1 + PAIRING_FRESH_S) == ""
+    pairings.heard("f", "me", 3.0)
+    assert pairings.other_than("me", "f", 3.0) == ""
+
+
+def test_of_many_writers_the_last_ones_are_remembered() -> None:
+    pairings = Pairings()
+    pairings.heard("first", "other", 0.0)
+    for k in range(PAIRINGS_KEPT - 1):
+        pairings.heard(f"f{k}", "other", 0.0)
+    pairings.heard("first", "other", 0.0)
+    pairings.heard("last", "other", 0.0)
+    assert pairings.other_than("me", "first", 0.0) == "other"
+    assert pairings.other_than("me", "f0", 0.0) == ""

@@ -25,6 +25,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import LOOKS, STOP
+from hmcs.driving import Pairings
 from hmcs.supervision import Order
 from hmcs.task import load_task
 from hmcs_robot.arm_description import arm_description
@@ -44,10 +45,6 @@ from hmcs_robot.settings import RobotSettings
 
 SIGN_EVERY_S = 0.02
 """How often the control room gets a sign of life."""
-PAIRING_FRESH_S = 1.0
-"""A pairing not heard again for so long binds nobody any more."""
-PAIRINGS_KEPT = 16
-"""Fixture controllers whose pairing is remembered."""
 ORIGINS_KEPT = 256
 """Orders whose operator sample is remembered until the control room says that it took them."""
 MOST_NOTES = 40
@@ -72,7 +69,7 @@ class Robot(Service):
         self._waiting: Snapshot | None = None
         self._snapshot: Snapshot | None = None
         self._origins: OrderedDict[int, Origin | None] = OrderedDict()
-        self._pairings: OrderedDict[str, tuple[str, int]] = OrderedDict()
+        self._pairings = Pairings()
         self._joint_names = self._room.joint_names
         self._number = 0
         self._foreign_refusals = 0
@@ -131,8 +128,8 @@ class Robot(Service):
 
     def _on_command(self, received: Received[Command]) -> None:
         command, source = received.body, received.envelope.source
-        other = self._paired_with_another(source.boot, received.received_ns)
-        if other:
+        now_s = received.received_ns / NS_PER_S
+        if other := self._pairings.other_than(self.bus.source.boot, source.boot, now_s):
             self._refuse(f"{source.service}/{source.instance} drives another robot: {other}")
             self._hand_over(pack_unpaired(writer_id(source.boot)))
             return
@@ -150,18 +147,8 @@ class Robot(Service):
         self._hand_over(pack_order(self._number, order))
 
     def _on_pairing(self, received: Received[Pairing]) -> None:
-        writer = received.envelope.source.boot
-        self._pairings[writer] = (received.body.robot, received.received_ns)
-        self._pairings.move_to_end(writer)
-        if len(self._pairings) > PAIRINGS_KEPT:
-            self._pairings.popitem(last=False)
-
-    def _paired_with_another(self, writer: str, now_ns: int) -> str:
-        """Return the boot of another robot that this writer drives; empty where it is this one."""
-        robot, said_ns = self._pairings.get(writer, ("", 0))
-        if robot == self.bus.source.boot or now_ns - said_ns > PAIRING_FRESH_S * NS_PER_S:
-            return ""
-        return robot
+        writer, now_s = received.envelope.source.boot, received.received_ns / NS_PER_S
+        self._pairings.heard(writer, received.body.robot, now_s)
 
     def _on_stop(self, _: Ask) -> Done:
         if self._ended or not self._hand_over(pack_stop()):

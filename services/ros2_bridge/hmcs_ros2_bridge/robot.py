@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import OrderedDict
 from dataclasses import replace
 from typing import Any
 
@@ -31,6 +30,7 @@ from hmcs.bus.messages import (
 from hmcs.bus.service import Service, run
 from hmcs.bus.session import Bus, Received, RequestRefusedError
 from hmcs.bus.verbs import LOOKS, STOP
+from hmcs.driving import Pairings
 from hmcs.supervision import (
     Order,
     Policy,
@@ -49,10 +49,6 @@ from hmcs_ros2_bridge.robot_settings import RosRobotSettings
 from hmcs_ros2_bridge.ros import Node, Topic
 from hmcs_ros2_bridge.tool_limits import Limited, tool_limits_of
 
-PAIRING_FRESH_S = 1.0
-"""A pairing not heard again for so long binds nobody any more."""
-PAIRINGS_KEPT = 16
-"""Fixture controllers whose pairing is remembered."""
 OTHERS_EVERY_S = 0.5
 """How often other publishers on the command's topic are looked for."""
 _NS_PER_S = 1_000_000_000
@@ -87,7 +83,7 @@ class RosRobot(Service):
         self._admitted_ns = time.monotonic_ns()
         self._origin: Origin | None = None
         self._command_ns: int | None = None
-        self._pairings: OrderedDict[str, tuple[str, int]] = OrderedDict()
+        self._pairings = Pairings()
         self._trouble = "nothing was heard of the arm yet"
         self._others = 0
         self._told_stop = ""
@@ -144,7 +140,8 @@ class RosRobot(Service):
 
     def _on_command(self, received: Received[Command]) -> None:
         command, source = received.body, received.envelope.source
-        if other := self._paired_with_another(source.boot, received.received_ns):
+        now_s = received.received_ns / _NS_PER_S
+        if other := self._pairings.other_than(self.bus.source.boot, source.boot, now_s):
             self._refuse(f"{source.service}/{source.instance} drives another robot: {other}")
             self._supervision = unpaired(self._supervision, source.boot)
             return
@@ -167,18 +164,8 @@ class RosRobot(Service):
             self._move(now_ns)
 
     def _on_pairing(self, received: Received[Pairing]) -> None:
-        writer = received.envelope.source.boot
-        self._pairings[writer] = (received.body.robot, received.received_ns)
-        self._pairings.move_to_end(writer)
-        if len(self._pairings) > PAIRINGS_KEPT:
-            self._pairings.popitem(last=False)
-
-    def _paired_with_another(self, writer: str, now_ns: int) -> str:
-        """Return the boot of another robot that this writer drives; empty where it is this one."""
-        robot, said_ns = self._pairings.get(writer, ("", 0))
-        if robot == self.bus.source.boot or now_ns - said_ns > PAIRING_FRESH_S * _NS_PER_S:
-            return ""
-        return robot
+        writer, now_s = received.envelope.source.boot, received.received_ns / _NS_PER_S
+        self._pairings.heard(writer, received.body.robot, now_s)
 
     def _on_stop(self, _: Ask) -> Done:
         self._stop()
