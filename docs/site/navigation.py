@@ -22,6 +22,7 @@ WRITTEN = {
         "docs/how-to/own-device",
         "docs/how-to/own-robot",
         "docs/how-to/ros2",
+        "docs/how-to/own-data",
         "docs/how-to/several-hosts",
         "docs/how-to/closed-cell",
     ),
