@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 
 from hmcs.bus.messages import Belief, Label, Motion, RobotState
 from hmcs.bus.messages import Message as BusMessage
-from hmcs.recordings.foreign.ros_types import missing
+from hmcs.recordings.foreign.libraries import missing
 from hmcs.recordings.foxglove import BASE, OPERATOR
 from hmcs.recordings.reading import Recorded, RecordingContent, RecordingError
 from hmcs.whole_files import folder_written_whole

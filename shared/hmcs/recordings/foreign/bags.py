@@ -14,9 +14,10 @@ import yaml
 
 from hmcs.bounded_files import read_bounded
 from hmcs.recordings.foreign.bag_chunks import check_bag
+from hmcs.recordings.foreign.libraries import missing
 from hmcs.recordings.foreign.logs import Log, Message, Topic
 from hmcs.recordings.foreign.mcap_files import McapLog
-from hmcs.recordings.foreign.ros_types import decoded, missing, modern_name
+from hmcs.recordings.foreign.ros_types import decoded, modern_name
 from hmcs.recordings.foreign.said import kind_of
 from hmcs.recordings.reading import RecordingError
 

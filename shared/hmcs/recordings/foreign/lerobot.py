@@ -8,8 +8,7 @@ positions by a URDF. Pictures are not looked at.
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,42 +18,20 @@ from hmcs.arrays import Array
 from hmcs.bounded_files import read_bounded
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.forward_kinematics import Chain, poses, read_chain
-from hmcs.recordings.demonstrations import MOST_DEMONSTRATIONS, MOST_SAMPLES
+from hmcs.recordings.demonstrations import MOST_DEMONSTRATIONS
 from hmcs.recordings.foreign.choices import METERS, RADIANS, Choices
 from hmcs.recordings.foreign.columns import FORCE, PLACE, TURN, columns_in
-from hmcs.recordings.foreign.ros_types import missing
+from hmcs.recordings.foreign.lerobot_tables import INFO, STATE, Feature, Frames, episodes_of
 from hmcs.recordings.foreign.tracks import Track, demonstration_of
 from hmcs.recordings.reading import RecordingError
 from hmcs.recordings.stretches import NS_PER_S
 
-INFO = Path("meta") / "info.json"
 MOST_INFO_BYTES = 16 * 1024 * 1024
-MOST_FILES = 10_000
-LARGEST_TABLE_BYTES = 2 * 1024**3
-"""Of the columns that are read of one file, unpacked."""
 MOST_NUMBERS = 512
 """Of a feature."""
 FEATURES = ("observation.state", "action")
 """Of which the first that is there is taken by itself."""
-STATE = "state"
-"""A feature with the task state of each frame, as `hmcs export` writes it."""
-_BATCH_ROWS = 65_536
 _JOINT_ENDINGS = (".pos", "_pos", ".position", "_position")
-
-
-class _Feature(NamedTuple):
-    name: str
-    names: tuple[str, ...]
-    """Of its numbers."""
-
-
-class _Frames(NamedTuple):
-    """The frames of one episode."""
-
-    episode: int
-    time_s: list[float]
-    values: list[Array]
-    states: list[str | None]
 
 
 def episodes_in(folder: Path, choices: Choices) -> tuple[list[Demonstration], tuple[str, ...]]:
@@ -69,7 +46,7 @@ def episodes_in(folder: Path, choices: Choices) -> tuple[list[Demonstration], tu
     placed, said = _placed(where, feature, choices)
     labeled = STATE in info["features"]
     shown, notes = list[Demonstration](), [said]
-    for frames in _episodes(folder, feature, labeled):
+    for frames in episodes_of(folder, feature, labeled=labeled):
         if len(shown) == MOST_DEMONSTRATIONS:
             raise RecordingError(f"{folder}: more than {MOST_DEMONSTRATIONS} episodes")
         episode = f"{where}, episode {frames.episode}"
@@ -103,7 +80,7 @@ class _Placed(NamedTuple):
         return np.hstack([places, values[:, list(self.turn)]])
 
 
-def _placed(where: str, feature: _Feature, choices: Choices) -> tuple[_Placed, str]:
+def _placed(where: str, feature: Feature, choices: Choices) -> tuple[_Placed, str]:
     if choices.urdf is not None:
         return _by_joints(where, feature, choices, read_chain(choices.urdf, choices.link))
     columns = columns_in(feature.names, choices, where)
@@ -126,9 +103,7 @@ def _placed(where: str, feature: _Feature, choices: Choices) -> tuple[_Placed, s
     return _Placed(place, METERS[unit], turn, force, None, (), ()), said
 
 
-def _by_joints(
-    where: str, feature: _Feature, choices: Choices, chain: Chain
-) -> tuple[_Placed, str]:
+def _by_joints(where: str, feature: Feature, choices: Choices, chain: Chain) -> tuple[_Placed, str]:
     names = [_joint_name(name) for name in feature.names]
     absent = [name for name in chain.names if name not in names]
     if absent:
@@ -150,7 +125,7 @@ def _joint_name(name: str) -> str:
 
 
 def _demonstration(
-    name: str, where: str, frames: _Frames, placed: _Placed
+    name: str, where: str, frames: Frames, placed: _Placed
 ) -> tuple[Demonstration, list[str]]:
     values = np.array(frames.values)
     time_ns = np.round((np.array(frames.time_s) - frames.time_s[0]) * NS_PER_S).astype(np.int64)
@@ -190,7 +165,7 @@ def _info(folder: Path) -> Mapping[str, Any]:
     return info  # type: ignore[no-any-return]
 
 
-def _feature(folder: Path, info: Mapping[str, Any], choices: Choices) -> _Feature:
+def _feature(folder: Path, info: Mapping[str, Any], choices: Choices) -> Feature:
     features: Mapping[str, Any] = info["features"]
     vectors = [name for name in features if _width(features[name])]
     if len(choices.topics) > 1:
@@ -207,7 +182,7 @@ def _feature(folder: Path, info: Mapping[str, Any], choices: Choices) -> _Featur
     width = _width(features[wanted])
     if len(names) != width:
         names = tuple(str(number) for number in range(width))
-    return _Feature(wanted, names)
+    return Feature(wanted, names)
 
 
 def _width(feature: Mapping[str, Any]) -> int:
@@ -224,96 +199,3 @@ def _names(told: Any) -> tuple[str, ...]:
     if isinstance(told, dict):
         return tuple(name for each in told.values() for name in _names(each))
     return tuple(str(each) for each in told) if isinstance(told, list) else ()
-
-
-def _episodes(folder: Path, feature: _Feature, labeled: bool) -> Iterator[_Frames]:
-    """The frames of each episode, in the order in which they stand in the files."""
-    current: _Frames | None = None
-    seen = set[int]()
-    rows = enumerate(_rows(folder, feature, labeled))
-    for count, (episode, at_s, values, state) in rows:
-        if count >= MOST_SAMPLES:
-            raise RecordingError(f"{folder}: more than {MOST_SAMPLES} frames: take a part of it")
-        if current is None or episode != current.episode:
-            if current is not None:
-                yield current
-            if episode in seen:
-                raise RecordingError(f"{folder}: frames of episode {episode} stand apart")
-            seen.add(episode)
-            current = _Frames(episode, [], [], [])
-        current.time_s.append(at_s)
-        current.values.append(values)
-        current.states.append(state or None)
-    if current is not None:
-        yield current
-
-
-def _rows(
-    folder: Path, feature: _Feature, labeled: bool
-) -> Iterator[tuple[int, float, Array, str | None]]:
-    try:
-        import pyarrow as arrow
-        import pyarrow.parquet as parquet
-    except ImportError as error:
-        raise missing("lerobot", f"{folder}: is read by pyarrow, which is not here") from error
-    files = sorted((folder / "data").glob("chunk-*/*.parquet"))[: MOST_FILES + 1]
-    if len(files) > MOST_FILES:
-        raise RecordingError(f"{folder}: more than {MOST_FILES} files under data/")
-    wanted = ["episode_index", "timestamp", feature.name, *([STATE] if labeled else [])]
-    for file in files:
-        try:
-            with parquet.ParquetFile(file) as table:
-                _check_table(file, table, wanted)
-                for batch in table.iter_batches(_BATCH_ROWS, columns=wanted, use_threads=False):
-                    yield from _of_batch(file, batch, feature, labeled)
-        except (arrow.ArrowException, OSError, MemoryError) as error:
-            raise RecordingError(
-                f"{file}: cannot be read ({str(error)[:200] or type(error).__name__}): was it "
-                "copied whole? Fetch it again"
-            ) from error
-
-
-def _check_table(file: Path, table: Any, wanted: Sequence[str]) -> None:
-    absent = [name for name in wanted if name not in table.schema_arrow.names]
-    if absent:
-        raise RecordingError(
-            f"{file}: has no column {absent[0]!r}; it has "
-            f"{', '.join(table.schema_arrow.names[:40])}"
-        )
-    if table.metadata.num_rows > MOST_SAMPLES:
-        raise RecordingError(f"{file}: more than {MOST_SAMPLES} frames")
-    groups = (table.metadata.row_group(k) for k in range(table.metadata.num_row_groups))
-    size = 0
-    for group in groups:
-        for k in range(group.num_columns):
-            column = group.column(k)
-            if column.path_in_schema.startswith(tuple(wanted)):
-                size += column.total_uncompressed_size
-    if size > LARGEST_TABLE_BYTES:
-        raise RecordingError(f"{file}: its numbers unpack to {size / 1e9:.1f} GB")
-
-
-def _of_batch(
-    file: Path, batch: Any, feature: _Feature, labeled: bool
-) -> Iterator[tuple[int, float, Array, str | None]]:
-    episodes = batch.column("episode_index").to_pylist()
-    times = batch.column("timestamp").to_pylist()
-    vectors = batch.column(feature.name).to_pylist()
-    states = batch.column(STATE).to_pylist() if labeled else [None] * len(episodes)
-    width = len(feature.names)
-    for row, (episode, at_s, vector, state) in enumerate(
-        zip(episodes, times, vectors, states, strict=True)
-    ):
-        at_s, episode = _one(at_s), _one(episode)
-        if not isinstance(vector, list) or len(vector) != width or None in vector:
-            raise RecordingError(
-                f"{file}: row {row}: {feature.name} has not the {width} numbers that {INFO} says"
-            )
-        if not isinstance(episode, int) or at_s is None or not math.isfinite(at_s):
-            raise RecordingError(f"{file}: row {row}: has no episode or no finite timestamp")
-        yield episode, float(at_s), np.array(vector, dtype=float), state and str(_one(state))
-
-
-def _one(value: Any) -> Any:
-    """A number that some versions keep as a list of one."""
-    return value[0] if isinstance(value, list) and len(value) == 1 else value

@@ -19,8 +19,9 @@ from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.quaternions import continuous
 from hmcs.recordings.foreign.columns import FORCE, PLACE, TURN
-from hmcs.recordings.foreign.lerobot import FEATURES, INFO, STATE
-from hmcs.recordings.foreign.ros_types import missing
+from hmcs.recordings.foreign.lerobot import FEATURES
+from hmcs.recordings.foreign.lerobot_tables import INFO, STATE
+from hmcs.recordings.foreign.libraries import missing
 from hmcs.recordings.reading import RecordingError
 from hmcs.whole_files import folder_written_whole
 

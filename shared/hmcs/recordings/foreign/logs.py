@@ -7,18 +7,12 @@ taken by itself; where there are several a person chooses.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
-from hmcs.arrays import Array
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.forward_kinematics import poses, read_chain
-from hmcs.motion.quaternions import turned
-from hmcs.recordings.foreign.choices import METERS, RADIANS, Choices
+from hmcs.recordings.foreign.choices import Choices
 from hmcs.recordings.foreign.said import (
     BUTTONS,
     FORCES,
@@ -29,13 +23,10 @@ from hmcs.recordings.foreign.said import (
     Kind,
     Said,
 )
-from hmcs.recordings.foreign.tracks import Mark, Track, TrackMaker, demonstration_of
+from hmcs.recordings.foreign.sensors import ButtonSensor, JointSensor, Sensor, VelocitySensor
+from hmcs.recordings.foreign.tracks import demonstration_of
 from hmcs.recordings.reading import RecordingError
-from hmcs.recordings.stretches import NS_PER_S
 
-STANDS_AFTER_S = 0.5
-"""A velocity holds no longer than this: who sends none is standing still."""
-MOST_JOINTS = 256
 _SHOWN_TOPICS = 30
 
 
@@ -107,7 +98,7 @@ def motion_in(log: Log, choices: Choices) -> FoundMotion:
         at_ns = message.said.stamp_ns if stamped else message.log_ns
         makers[message.topic].take(at_ns or 0, message.said)
     own = makers[chosen.motion.name]
-    motion = own.motion(where)
+    motion = own.motion()
     force = None if chosen.force is None else makers[chosen.force.name].samples.track()
     marks = () if chosen.buttons is None else tuple(makers[chosen.buttons.name].marks)
     shown, notes = demonstration_of(log.where.name, where, motion, force, marks)
@@ -118,7 +109,7 @@ def motion_in(log: Log, choices: Choices) -> FoundMotion:
     beside = [f"force of {chosen.force.name}"] if chosen.force is not None else []
     beside += [f"states of {chosen.buttons.name}"] if chosen.buttons is not None else []
     return FoundMotion(
-        shown, (", ".join([said + clock, *beside]), *chosen.notes, *own.notes(where), *notes)
+        shown, (", ".join([said + clock, *beside]), *chosen.notes, *own.notes(), *notes)
     )
 
 
@@ -215,121 +206,14 @@ def _first(log: Log, topic: Topic) -> Message:
     return first
 
 
-class _Maker:
-    """Makes tracks of the messages on one topic."""
-
-    def __init__(self, where: str, width: int) -> None:
-        self.samples = TrackMaker(where, width)
-        self.marks = list[Mark]()
-        self._where = where
-        self._frame: str | None = None
-
-    def take(self, at_ns: int, said: Said) -> None:
-        if self._frame is None:
-            self._frame = said.frame
-        elif said.frame != self._frame:
-            raise RecordingError(
-                f"{self._where}: is in frame {self._frame!r} first and in {said.frame!r} at "
-                f"message {len(self.samples) + 1}: a demonstration has one frame; name another "
-                "topic by --topic"
-            )
-        self._add(at_ns, said)
-
-    def motion(self, where: str) -> Track:
-        return self.samples.track()
-
-    def notes(self, where: str) -> list[str]:
-        return []
-
-    def _add(self, at_ns: int, said: Said) -> None:
-        self.samples.add(at_ns, said.numbers)
-
-
-class _Velocities(_Maker):
-    def motion(self, where: str) -> Track:
-        return _integrated(self.samples.track())
-
-    def notes(self, where: str) -> list[str]:
-        return [
-            f"{where}: velocities in frame {self._frame or '(none)'!r} are integrated from 0, as "
-            "if that frame stood still"
-        ]
-
-
-class _Joints(_Maker):
-    def __init__(self, where: str, choices: Choices) -> None:
-        assert choices.urdf is not None
-        self._chain = read_chain(choices.urdf, choices.link)
-        self._choices = choices
-        super().__init__(where, len(self._chain.names))
-
-    def motion(self, where: str) -> Track:
-        track = self.samples.track()
-        angle, length = RADIANS[self._choices.angle or "rad"], METERS[self._choices.length or "m"]
-        scale = [angle if name in self._chain.turning else length for name in self._chain.names]
-        places, turns = poses(self._chain, self._chain.names, track.values * scale)
-        return Track(track.time_ns, np.hstack([places, turns]))
-
-    def notes(self, where: str) -> list[str]:
-        return [f"{where}: positions of link {self._chain.link!r} of {self._chain.file}"]
-
-    def _add(self, at_ns: int, said: Said) -> None:
-        if len(said.names) > MOST_JOINTS or len(said.names) != len(said.numbers):
-            raise RecordingError(
-                f"{self._where}: message {len(self.samples) + 1} names {len(said.names)} joints "
-                f"and has {len(said.numbers)} positions, expected as many, at most {MOST_JOINTS}"
-            )
-        there = dict(zip(said.names, said.numbers, strict=True))
-        missing = [name for name in self._chain.names if name not in there]
-        if len(missing) == len(self._chain.names) and len(self.samples) == 0 and there:
-            raise RecordingError(
-                f"{self._where}: names the joints {', '.join(said.names[:20])}, "
-                f"{self._chain.file} needs {', '.join(missing[:20])}: is it another robot's?"
-            )
-        if missing:
-            raise RecordingError(
-                f"{self._where}: message {len(self.samples) + 1} has no position of "
-                f"{', '.join(missing[:20])}: name another link by --link, or another topic"
-            )
-        self.samples.add(at_ns, [there[name] for name in self._chain.names])
-
-
-class _Buttons(_Maker):
-    def __init__(self, where: str, states: Mapping[int, str]) -> None:
-        super().__init__(where, 0)
-        self._states = states
-        self._held: set[int] = set()
-
-    def _add(self, at_ns: int, said: Said) -> None:
-        held = {number for number, pressed in enumerate(said.numbers) if pressed}
-        for number in sorted(held - self._held):
-            if number in self._states:
-                self.marks.append(Mark(at_ns, self._states[number]))
-        self._held = held
-
-
-def _maker(log: Log, topic: Topic, choices: Choices) -> _Maker:
+def _maker(log: Log, topic: Topic, choices: Choices) -> Sensor:
     where = f"{log.where}: {topic.name}"
-    makers: Mapping[Kind | None, Callable[[], _Maker]] = {
-        JOINTS: lambda: _Joints(where, choices),
-        VELOCITIES: lambda: _Velocities(where, 6),
-        FORCES: lambda: _Maker(where, 6),
-        BUTTONS: lambda: _Buttons(where, choices.marks),
+    makers: Mapping[Kind | None, Callable[[], Sensor]] = {
+        JOINTS: lambda: JointSensor(where, choices),
+        VELOCITIES: lambda: VelocitySensor(where, 6),
+        FORCES: lambda: Sensor(where, 6),
+        BUTTONS: lambda: ButtonSensor(where, choices.marks),
     }
     if topic.kind in makers:
         return makers[topic.kind]()
-    return _Maker(where, len(_first(log, topic).said.numbers))
-
-
-def _integrated(twists: Track) -> Track:
-    """The pose that velocities, shape (T, 6), lead to from the origin, shape (T, 7)."""
-    period_s = np.diff(twists.time_ns) / NS_PER_S
-    holds_s = np.where(period_s > STANDS_AFTER_S, 0.0, period_s)
-    linear, angular = twists.values[:, :3], twists.values[:, 3:]
-    moved = 0.5 * (linear[1:] + linear[:-1]) * holds_s[:, None]
-    places = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
-    turns: list[Array] = [np.array([0.0, 0.0, 0.0, 1.0])]
-    for velocity, lasts_s in zip(0.5 * (angular[1:] + angular[:-1]), holds_s, strict=True):
-        still = not math.hypot(*velocity)
-        turns.append(turns[-1] if still else turned(turns[-1], velocity, float(lasts_s)))
-    return Track(twists.time_ns, np.hstack([places, np.array(turns[: len(places)])]))
+    return Sensor(where, len(_first(log, topic).said.numbers))

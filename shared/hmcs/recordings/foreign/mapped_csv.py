@@ -17,6 +17,7 @@ from hmcs.errors import UserError
 from hmcs.motion.demonstrations import DemonstrationError
 from hmcs.recordings.foreign.choices import ISO, METERS, SECONDS, Choices
 from hmcs.recordings.foreign.columns import FORCE, PLACE, TURN, Column, columns_in, several_units
+from hmcs.shown import plain
 
 OWN = {
     "time": "time_s",
@@ -29,6 +30,8 @@ OWN = {
 """Names of our own columns by their roles."""
 SINCE_1970_S = 1e8
 """Larger times are dates: they count from the first row."""
+
+_LONGEST_NOTE = 4000
 
 Convert = Callable[[str], str]
 
@@ -101,10 +104,10 @@ class Mapped:
         taken = ", ".join(f"{role}={column.name}" for role, column in columns.items())
         used = {column.at for column in columns.values()}
         others = [name for at, name in enumerate(table.header) if at not in used]
-        self.notes.append(
-            f"{self._file.name}: columns {taken}; positions in {length}, times in {time}"
-            + (f"; not read: {', '.join(others)}" if others else "")
-        )
+        note = f"{self._file.name}: columns {taken}; positions in {length}, times in {time}"
+        if others:
+            note += f"; not read: {', '.join(others)}"
+        self.notes.append(plain(note, _LONGEST_NOTE))
         return table._replace(header=tuple(header), rows=self._rows(table, converts))
 
     def _rows(self, table: CsvTable, converts: Mapping[int, Convert]) -> Iterator[Row]:

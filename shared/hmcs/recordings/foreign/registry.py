@@ -10,15 +10,24 @@ from hmcs.bounded_files import UnreadableFileError
 from hmcs.motion.demonstrations import Demonstration
 from hmcs.recordings.foreign.bags import BAG1_MAGIC, METADATA, SQLITE_MAGIC, bag_at
 from hmcs.recordings.foreign.choices import Choices
-from hmcs.recordings.foreign.lerobot import INFO, episodes_in
+from hmcs.recordings.foreign.lerobot import episodes_in
+from hmcs.recordings.foreign.lerobot_tables import INFO
 from hmcs.recordings.foreign.logs import Log, motion_in
 from hmcs.recordings.foreign.mcap_files import McapLog
 from hmcs.recordings.mcap_records import MAGIC as MCAP_MAGIC
 from hmcs.recordings.reading import RecordingError, read
+from hmcs.recordings.writing import PROFILE
+from hmcs.shown import plain
 
 ENDINGS = (".bag", ".db3")
 """Of files of these formats in a folder, beside MCAP; what they are their content says."""
 PACKED = (".db3.zstd", ".mcap.zstd", ".bag.gz")
+
+
+_PROFILE_AT = len(MCAP_MAGIC) + 9
+"""Behind the head of the first record."""
+_PROFILE = len(PROFILE).to_bytes(4, "little") + PROFILE.encode()
+_LONGEST_NOTE = 4000
 
 
 class Taken(NamedTuple):
@@ -60,8 +69,12 @@ def _begins(path: Path, magic: bytes) -> bool:
 
 
 def _is_foreign_mcap(path: Path) -> bool:
-    # A file in which nothing is of our own contract.
-    return _begins(path, MCAP_MAGIC) and not read(path).schemas
+    if not _begins(path, MCAP_MAGIC):
+        return False
+    with path.open("rb") as stream:
+        # A recorder of our own says so at once; in a file that was merged or mended one looks.
+        ours = stream.read(_PROFILE_AT + len(_PROFILE))[_PROFILE_AT:] == _PROFILE
+    return not ours and not read(path).schemas
 
 
 FORMATS = (
@@ -103,7 +116,9 @@ def take(form: Format, path: Path, choices: Choices) -> Taken:
     Raises RecordingError, which says where and what to do, for what cannot be used.
     """
     try:
-        return form.take(path, choices)
+        taken = form.take(path, choices)
+        # They quote the file.
+        return taken._replace(notes=tuple(plain(note, _LONGEST_NOTE) for note in taken.notes))
     except UnreadableFileError as error:
         raise RecordingError(str(error)) from error
     except OSError as error:

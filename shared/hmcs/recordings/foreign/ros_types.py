@@ -9,21 +9,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from hmcs.errors import UserError
+from hmcs.recordings.foreign.libraries import missing
 from hmcs.recordings.foreign.said import Said, said_by
 from hmcs.recordings.reading import RecordingError
 
 LARGEST_MESSAGE_BYTES = 4 * 1024 * 1024
 """Of a message that is read; of those that are read here none has a thousandth of it."""
-
-
-class MissingLibraryError(UserError):
-    """A library that a format needs is not installed; says which."""
-
-
-def missing(extra: str, why: str) -> MissingLibraryError:
-    """Return the error that names what to install for a format."""
-    return MissingLibraryError(f"{why}: pip install 'hmcs[{extra}]'")
 
 
 @cache

@@ -11,7 +11,7 @@ import pytest
 
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.recordings.foreign import lerobot
+from hmcs.recordings.foreign import lerobot_tables
 from hmcs.recordings.foreign.choices import AS_IT_IS, Choices, choices_of
 from hmcs.recordings.foreign.registry import format_of, take
 from support import foreign_files as made
@@ -105,5 +105,5 @@ def test_a_table_that_unpacks_to_too_much_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = made.write_lerobot(tmp_path / "set", [made.way(30)], ("x", "y", "z"))
-    monkeypatch.setattr(lerobot, "LARGEST_TABLE_BYTES", 100)
+    monkeypatch.setattr(lerobot_tables, "LARGEST_TABLE_BYTES", 100)
     assert "unpack to" in refused(folder)
