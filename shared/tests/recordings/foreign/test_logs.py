@@ -97,6 +97,14 @@ def test_velocities_are_integrated(tmp_path: Path) -> None:
     )
 
 
+def test_a_velocity_that_grows_leads_as_far_as_its_mean(tmp_path: Path) -> None:
+    times = made.times_ns(101)
+    sent = [("/servo", ns, made.twist_stamped(ROS2, ns, (0.01 * k, 0, 0, 0, 0, 0)))
+            for k, ns in enumerate(times)]  # fmt: skip
+    shown = only(made.write_bag2(tmp_path / "b", sent))
+    np.testing.assert_allclose(shown.positions[:, 0], 0.5 * shown.time_s**2, atol=1e-12)
+
+
 def test_joint_positions_become_poses_by_the_urdf(tmp_path: Path) -> None:
     urdf = tmp_path / "arm.urdf"
     urdf.write_text(made.ARM)
@@ -226,9 +234,14 @@ def test_damaged_bytes_end_in_a_clear_refusal_or_in_a_demonstration(
 def test_a_chunk_that_unpacks_to_more_than_can_be_held_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = bag1("BZ2")(tmp_path, made.poses_sent(ROS1))
-    monkeypatch.setattr(bag_chunks, "LARGEST_CHUNK_BYTES", 1000)
-    assert "chunk of more than" in refused(path)
+    still = made.pose_stamped(ROS1, made.BEGUN_NS, (0, 0, 0))
+    sent = [("/tool", ns, still) for ns in made.times_ns(1000)]
+    for packing in ("BZ2", "LZ4"):
+        path = made.write_bag1(tmp_path / f"{packing}.bag", sent, packing)
+        # More than the chunk has packed, less than it has unpacked.
+        monkeypatch.setattr(bag_chunks, "LARGEST_CHUNK_BYTES", 50_000)
+        assert path.stat().st_size < 50_000 < 80 * len(sent)
+        assert "chunk of more than" in refused(path)
 
 
 def test_a_database_with_a_program_in_it_is_refused(tmp_path: Path) -> None:

@@ -13,13 +13,14 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from hmcs.bus.messages import Belief, Motion, RobotState
+from hmcs.motion.demonstrations import Demonstration
 from hmcs.recordings.demonstrations import demonstrations_of
 from hmcs.recordings.foreign.bag_writing import write_bag
 from hmcs.recordings.foreign.choices import choices_of
 from hmcs.recordings.foreign.lerobot_writing import write_data_set
 from hmcs.recordings.foreign.registry import format_of, take
 from hmcs.recordings.reading import RecordingError, read
-from support.recordings import KEYS, Maker, Said
+from support.recordings import BEGUN_NS, KEYS, Maker, Said
 
 STATE = RobotState(
     robot="puma560",
@@ -143,6 +144,37 @@ def test_a_data_set_of_lerobot_has_an_episode_for_each_demonstration(
     assert form is not None
     again = take(form, folder, choices_of()).demonstrations
     assert [set(each.states) for each in again] == [{"go"}, {"turn"}]
+
+
+def test_headers_say_when_a_sample_was_taken(maker: Maker, tmp_path: Path) -> None:
+    recording = maker.begin()
+    taken_ns = BEGUN_NS - 4_000_001
+    recording.write(KEYS.motion, maker.fields(FELT, 0), BEGUN_NS, taken_ns)
+    recording.finish()
+    folder = tmp_path / "bag"
+    write_bag(read(recording.path), folder)
+    with AnyReader([folder]) as reader:
+        for connection, at_ns, data in reader.messages():
+            stamp = reader.deserialize(data, connection.msgtype).header.stamp  # type: ignore[attr-defined]
+            assert (at_ns, stamp.sec * 10**9 + stamp.nanosec) == (BEGUN_NS, taken_ns)
+
+
+def test_an_orientation_between_two_samples_is_between_them(tmp_path: Path) -> None:
+    # About z at 2 rad/s; q and -q are the same rotation.
+    signs = np.array([1.0, -1.0] * 5)[:, None]
+    time_s = 0.1 * np.arange(10)
+    turn = np.stack([0 * time_s, 0 * time_s, np.sin(time_s), np.cos(time_s)], axis=1)
+    shown = Demonstration("d", time_s, np.zeros((10, 3)), (None,) * 10, signs * turn)
+    write_data_set([shown], tmp_path / "set", "turn", fps=30)
+    table = parquet.read_table(next((tmp_path / "set").glob("data/*/*.parquet")))
+    turns = np.array(table["observation.state"].to_pylist())[:, 3:]
+    at_s = np.arange(len(turns)) / 30
+    assert len(turns) == 28
+    np.testing.assert_allclose(np.abs(turns[:, 2]), np.abs(np.sin(at_s)), atol=1e-4)
+
+
+def test_a_recording_of_our_own_is_no_other_programs_though_it_is_empty(maker: Maker) -> None:
+    assert format_of(maker.write([])) is None
 
 
 def test_nothing_is_left_of_an_export_that_failed(maker: Maker, tmp_path: Path) -> None:
