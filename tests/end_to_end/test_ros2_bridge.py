@@ -99,6 +99,8 @@ def test_a_robot_killed_in_motion_is_stopped_and_resumes_only_when_a_person_does
     sent = listener.heard[COMMANDS.name]
     servo, robot = _driven(stack, driver)
     assert driver.states[-1].joint_names == ("slide_x", "slide_y", "slide_z")
+    # Nodes of ROS find each other in their own time.
+    stack.until(lambda: sent)
 
     servo.send(signal.SIGKILL)
     stack.until(lambda: driver.states[-1].stop == "late_tick")
@@ -258,7 +260,7 @@ def _press(stack: Stack, operator: RosOperator, motions: list[Motion]) -> None:
     motions.clear()
     stack.until(lambda: len(motions) > 10)
     operator.held = True
-    stack.until(lambda: motions[-1].dead_man)
+    stack.until(lambda: motions and motions[-1].dead_man)
 
 
 ROBOT_STATE = RobotState(
