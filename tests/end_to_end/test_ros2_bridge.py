@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -217,8 +218,14 @@ def test_from_a_ros_operator_to_a_ros_robot_through_the_stack(stack: Stack) -> N
         operator.held = False
         stack.until(lambda: states and motions and states[-1].stop == "disengaged")
         begun = states[-1].tool_position.copy()
-        operator.held = True
-        stack.until(lambda: states[-1].tool_position[1] - begun[1] > 0.03)
+
+        def led_on() -> bool:
+            # A press counts once the switch was seen released, and nodes of ROS find each other in
+            # their own time: a person whose press does nothing lets go and presses again.
+            operator.held = motions[-1].dead_man or time.monotonic() % 2.0 > 0.5
+            return bool(states[-1].tool_position[1] - begun[1] > 0.03)
+
+        stack.until(led_on)
         operator.held = False
         stack.until(lambda: states[-1].stop == "disengaged")
     finally:
