@@ -204,7 +204,7 @@ def test_names_that_are_none_end_nothing_and_are_not_seen(
     Stranger(stack)
     viewer = open_viewer(shown, bypass_csp=True)
     viewer.open_tab("Services")
-    viewer.until(lambda: "robot stranger" in on_page(viewer), DRAWN_S)
+    viewer.until(lambda: "robot/stranger" in on_page(viewer), DRAWN_S)
     reported = on_page(viewer)
     assert not any(word in reported for word in ("evil", "onerror", "yyy"))
     is_harmless(viewer)

@@ -38,7 +38,7 @@ def test_the_page_shows_a_scene_and_asks_nobody_but_its_console(
     assert viewer.colors() >= MANY_COLORS
     for tab in ("Plots", "Recognizers", "Teach", "Services", "Operate"):
         viewer.open_tab(tab)
-    viewer.until(lambda: viewer.sees("Nobody operates"))
+    viewer.until(lambda: viewer.sees("Nobody can operate"))
     console = urlsplit(watched.url).netloc
     asked = [urlsplit(url.removeprefix("blob:")) for url in viewer.requests]
     assert {"http", "ws"} <= {place.scheme for place in asked}
