@@ -14,7 +14,8 @@ from hmcs_local.own_task import PAGE, arranged, input_environment, own_task, unh
 from support.lessons import lesson_task, performed
 
 DATA = Path(__file__).parents[3] / "examples/data"
-SERVICES = tuple(load_compose(own_compose(), {}).services)
+SPEC = load_compose(own_compose(), {})
+SERVICES = tuple(name for name, spec in SPEC.services.items() if not spec.optional)
 DEMO_ALONE = {"teach", "gesteme-classifier", "task-hmm"}
 
 
