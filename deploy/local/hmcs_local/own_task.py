@@ -32,11 +32,12 @@ Environment = Mapping[str, Mapping[str, str | None]]
 class OwnTask(NamedTuple):
     """A task that the stack is brought up for."""
 
-    task: Task
     place: str
     """The task's name where it comes along, else the absolute path of its file."""
     model: Path | None = None
     """What recognizes it from the start."""
+    layered: bool = False
+    """Whether that model is of the default kind, which is spread over processes."""
     source: str = PAGE
     """Of the input device."""
     demonstration: Path | None = None
@@ -63,15 +64,17 @@ def own_task(
     played = next((Path(each) for each in demonstrations if each.endswith(".csv")), None)
     if source == RECORDED and played is None:
         raise UserError(f"--source {RECORDED}: give the CSV file to play as a demonstration")
+    layered = False
     if model is not None:
-        _check_is_of(load_model(model), model, known)
-    return OwnTask(known, place, model, source, played)
+        read = load_model(model)
+        _check_is_of(read, model, known)
+        layered = read.recognizer == DEFAULT
+    return OwnTask(place, model, layered, source, played)
 
 
 def arranged(own: OwnTask, services: Sequence[str], models: Path, recordings: Path) -> Arrangement:
     """Return how `services` of compose.yaml run for a task; models and recordings are folders."""
-    layered = own.model is not None and load_model(own.model).recognizer == DEFAULT
-    left_out = {"teach"} if layered else set(_DEMO_ALONE)
+    left_out = {"teach"} if own.layered else set(_DEMO_ALONE)
     model = None if own.model is None else str(own.model.resolve())
     file = [own.place] if Path(own.place).is_absolute() else []
     return Arrangement(
@@ -81,7 +84,7 @@ def arranged(own: OwnTask, services: Sequence[str], models: Path, recordings: Pa
             | {"HMCS_TASK": own.place},
             "gesteme-classifier": {"HMCS_MODEL": model},
             "task-hmm": {"HMCS_MODEL": model},
-            "recognizer": {"HMCS_MODEL": None if layered else model},
+            "recognizer": {"HMCS_MODEL": None if own.layered else model},
             "fixture-controller": {"HMCS_MODELS": json.dumps([model] if model else [])},
             "robot": {"HMCS_TASK": own.place},
             "console": {"HMCS_TASK": own.place, "HMCS_MODELS": json.dumps(_folders(models, model))},
