@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from hmcs_local.commands.options import Columns, Link, Marks, Times, Topics, Units, Urdf
+from hmcs_local.commands.options import (
+    Columns,
+    Link,
+    Marks,
+    Times,
+    Topics,
+    Units,
+    Urdf,
+    file_choices,
+)
 
 FILES = (
     "CSV files, recordings, bags of ROS, LeRobot data sets, folders of them, patterns, "
@@ -45,19 +54,10 @@ def segment(
     What came after a moment counts as well as what came before. The probability is that of the
     state, all of the motion given, in the mean over the segment.
     """
-    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.segmenting import segment_files
 
-    choices = choices_of(
-        topics=topics or (),
-        columns=columns,
-        units=units or (),
-        time=time,
-        urdf=urdf,
-        link=link,
-        marks=marks,
-    )
+    choices = file_choices(topics, columns, units, time, urdf, link, marks)
     segment_files(
         expanded(files), model, out=out, anywhere=anywhere, console=Console(), choices=choices
     )
@@ -80,19 +80,10 @@ def check(
 
     The exit code is 2 where `hmcs train` would refuse one.
     """
-    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.checking import show_check
     from hmcs_local.demonstration_files import expanded
 
-    choices = choices_of(
-        topics=topics or (),
-        columns=columns,
-        units=units or (),
-        time=time,
-        urdf=urdf,
-        link=link,
-        marks=marks,
-    )
+    choices = file_choices(topics, columns, units, time, urdf, link, marks)
     raise typer.Exit(0 if show_check(expanded(files), task, Console(), choices) else 2)
 
 
@@ -115,18 +106,9 @@ def import_files(
     Bags of ROS 1 and 2, MCAP files, LeRobot data sets, CSV files with other columns. What is taken
     for what is said on stderr. Files that are there already are not replaced.
     """
-    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.importing import import_as_csv
 
-    choices = choices_of(
-        topics=topics or (),
-        columns=columns,
-        units=units or (),
-        time=time,
-        urdf=urdf,
-        link=link,
-        marks=marks,
-    )
+    choices = file_choices(topics, columns, units, time, urdf, link, marks)
     for note in import_as_csv(expanded(sources), to, choices, typer.echo):
         typer.echo(note, err=True)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hmcs.errors import UserError
+
+if TYPE_CHECKING:
+    from hmcs.recordings.foreign.choices import Choices
 
 Router = Annotated[
     str, typer.Option(envvar="HMCS_ROUTER", metavar="ENDPOINT", help="Where the router is.")
@@ -77,6 +80,29 @@ Marks = Annotated[
         help="States that begin where a joystick's button is pressed: 0=approach,1=insert.",
     ),
 ]
+
+
+def file_choices(
+    topics: list[str] | None,
+    columns: str,
+    units: list[str] | None,
+    time: str,
+    urdf: Path | None,
+    link: str,
+    marks: str,
+) -> Choices:
+    """Return how files of other programs are read, of the options above; see `choices_of`."""
+    from hmcs.recordings.foreign.choices import choices_of
+
+    return choices_of(
+        topics=topics or (),
+        columns=columns,
+        units=units or (),
+        time=time,
+        urdf=urdf,
+        link=link,
+        marks=marks,
+    )
 
 
 def setting(item: str) -> tuple[str, str]:

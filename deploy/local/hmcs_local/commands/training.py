@@ -19,6 +19,7 @@ from hmcs_local.commands.options import (
     Topics,
     Units,
     Urdf,
+    file_choices,
     setting,
 )
 from hmcs_local.commands.replies import tell_replies
@@ -84,20 +85,11 @@ def train(
     taken for each other, how far demonstrations lay apart, and what would help. States that are
     found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
-    from hmcs.recordings.foreign.choices import choices_of
     from hmcs_local.demonstration_files import expanded
     from hmcs_local.progress import fits_shown
     from hmcs_trainer.training import train as learn
 
-    files = choices_of(
-        topics=topics or (),
-        columns=columns,
-        units=units or (),
-        time=time,
-        urdf=urdf,
-        link=link,
-        marks=marks,
-    )
+    files = file_choices(topics, columns, units, time, urdf, link, marks)
     alternatives = {name: value.split(",") for name, value in map(setting, choices or [])}
     with fits_shown(bool(alternatives)) as fits:
         model = learn(
