@@ -15,6 +15,13 @@ class UserError(Exception):
     """
 
 
+class NothingToDoError(Exception):
+    """What a process is for is not wanted as it was started; its message says why.
+
+    A service that starts with one logs the message and exits with code 0.
+    """
+
+
 def first_problem(error: ValidationError) -> tuple[str, str]:
     """Return the first field that is wrong, names joined by dots where they nest, and why."""
     first = error.errors(include_url=False, include_input=False)[0]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,10 +21,11 @@ from hmcs.errors import UserError
 from hmcs.recognition.model_file import load_model
 from hmcs.recognizer_takeover import activate, load_into_fixture, load_into_recognizer
 from hmcs_local.connecting import open_operator
-from hmcs_local.stack import with_free_port
+from hmcs_local.stack import LAYERED, LocalStack, with_free_port
 from support.stack import CELL, DEADLINE_S, clean_environment
 
-DATA = Path(__file__).parents[2] / "examples/data"
+COMPOSE = Path(__file__).parents[2] / "compose.yaml"
+DATA = COMPOSE.parent / "examples/data"
 HANDS = [DATA / f"hand-{k}.csv" for k in (1, 2, 3, 4)]
 STATES = {"reach", "turn", "lift"}
 A = TypeVar("A")
@@ -124,8 +126,32 @@ def test_demonstrations_are_learned_and_their_task_is_recognized_and_guided(
     assert all(set(belief.states) == STATES for belief in beliefs)
 
 
+@pytest.fixture
+def composed(tmp_path: Path) -> Iterator[Callable[[str], LocalStack]]:
+    """Starts compose.yaml for `mine.yaml` as Compose does: its variables and mounts are all."""
+    with ExitStack() as stacks:
+        yield lambda router: stacks.enter_context(
+            LocalStack(
+                COMPOSE,
+                variables={
+                    "HMCS_TASK": "/tasks/mine.yaml",
+                    "HMCS_TASK_FOLDER": str(tmp_path),
+                    "HMCS_CELL": CELL,
+                },
+                environment={"console": {"HMCS_PORT": "0"}},
+                router=router,
+                folder=tmp_path / "out/up",
+            )
+        )
+
+
+@pytest.mark.parametrize("by", ["hmcs up", "compose"])
 def test_without_a_model_the_stack_waits_to_be_taught_and_follows_what_is_activated(
-    tmp_path: Path, started: Callable[..., None], joined: Callable[[str], Bus]
+    tmp_path: Path,
+    started: Callable[..., None],
+    joined: Callable[[str], Bus],
+    composed: Callable[[str], LocalStack],
+    by: str,
 ) -> None:
     hmcs(tmp_path, "new", "mine", "--states", "reach,turn,lift")
     task = (tmp_path / "mine.yaml").read_text(encoding="utf-8")
@@ -134,7 +160,9 @@ def test_without_a_model_the_stack_waits_to_be_taught_and_follows_what_is_activa
     task = task.replace("[0.6, 0.0, 0.45]", "[0.55, 0.0, 0.4]")
     (tmp_path / "mine.yaml").write_text(task, encoding="utf-8")
     router = with_free_port("tcp/127.0.0.1:0")
-    started(("-m", "hmcs_local.command", "up", "mine.yaml", "--router", router))
+    stack = composed(router) if by == "compose" else None
+    if stack is None:
+        started(("-m", "hmcs_local.command", "up", "mine.yaml", "--router", router))
     bus = joined(router)
     progress: list[TrainingProgress] = []
     beliefs: list[Belief] = []
@@ -158,7 +186,7 @@ def test_without_a_model_the_stack_waits_to_be_taught_and_follows_what_is_activa
     for hand in HANDS[:3]:
         shutil.copy(hand, recordings)
     asked = Train(
-        model="first",
+        model="mine",
         task=str(tmp_path / "mine.yaml"),
         demonstrations=tuple(str(recordings / hand.name) for hand in HANDS[:3]),
     )
@@ -191,6 +219,14 @@ def test_without_a_model_the_stack_waits_to_be_taught_and_follows_what_is_activa
 
     wait_until(guided, "guidance in all three states")
     assert beliefs
+    if stack is None:
+        return
+    layered = [each for each in stack.processes.values() if each.service in LAYERED]
+    assert [each.exit_code for each in layered] == [0, 0, 0]
+    stack.stop_all()
+    # A model under the name of the task is at work from the start the next time.
+    stack.start_all()
+    wait_until(lambda: present("gesteme_classifier", "task_hmm"), "the layered recognizer")
 
 
 def test_a_second_host_has_its_models_from_the_one_that_has_them(
@@ -213,8 +249,11 @@ def test_a_second_host_has_its_models_from_the_one_that_has_them(
 
     wait_until(lambda: present("fixture_controller"), "the fixture controller")
     other = tmp_path / "other-host"
-    compose = (Path(__file__).parents[2] / "compose.yaml").read_text(encoding="utf-8")
-    (tmp_path / "compose.yaml").write_text(compose.replace("human-shapes.hmcs", model.name))
+    compose = COMPOSE.read_text(encoding="utf-8")
+    task = tmp_path / "mine.yaml"
+    (tmp_path / "compose.yaml").write_text(
+        compose.replace("HMCS_TASK:-human-shapes", f"HMCS_TASK:-{task}")
+    )
     started(
         (
             *("-m", "hmcs_local.command", "up", "--compose", tmp_path / "compose.yaml"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +12,8 @@ from hmcs.task import load_task
 from hmcs_local.compose import StackSpec
 from hmcs_local.own_task import PAGE, Arrangement, arranged, input_environment, own_task
 
+DEMO = "human-shapes"
+"""The task that compose.yaml teaches and plays where no other is named."""
 _INPUT = "input-device"
 
 
@@ -28,6 +30,12 @@ class Wanted(NamedTuple):
     """Kind that is learned from the demonstrations; the default one where None."""
 
 
+def task_named(environment: Mapping[str, str]) -> str | None:
+    """Return the task that the environment names in place of the demo, if it does."""
+    task = environment.get("HMCS_TASK")
+    return None if task in (None, "", DEMO) else task
+
+
 def arrangement_of(
     spec: StackSpec, folder: Path, wanted: Wanted, progress: Callable[[str], None]
 ) -> Arrangement:
@@ -37,12 +45,11 @@ def arrangement_of(
     time. Raises UserError for what does not go together, and as training and reading a task do.
     """
     _check(wanted)
-    services = spec.usual
     models, recordings = (folder.resolve() / name for name in ("models", "recordings"))
     if wanted.task is None:
         source = wanted.source
         changed = {} if source is None else {_INPUT: _demo_input(source, models)}
-        return Arrangement(services, changed)
+        return Arrangement(spec.usual, changed)
     models.mkdir(parents=True, exist_ok=True)
     model = wanted.model or _learned(wanted, models, progress)
     own = own_task(
@@ -51,7 +58,7 @@ def arrangement_of(
         source=wanted.source or PAGE,
         demonstrations=wanted.demonstrations,
     )
-    return arranged(own, services, models, recordings)
+    return arranged(own, spec, models, recordings)
 
 
 def _check(wanted: Wanted) -> None:
@@ -92,4 +99,4 @@ def _learned(wanted: Wanted, models: Path, progress: Callable[[str], None]) -> P
 
 def _demo_input(source: str, models: Path) -> dict[str, str | None]:
     """Another source for the demo, with what its one-shot service learns and chains."""
-    return input_environment(source, str(models / "human-shapes.hmcs"), models / "performance.csv")
+    return input_environment(source, str(models / f"{DEMO}.hmcs"), models / f"{DEMO}.csv")

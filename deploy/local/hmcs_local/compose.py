@@ -47,6 +47,8 @@ class ServiceSpec:
     stop_grace_s: float
     volumes: Mapping[str, str]
     """Folder in the container to the name of the volume that stands there."""
+    mounts: Mapping[str, Path]
+    """Folder in the container to the folder of this machine that stands there."""
 
 
 @dataclass(frozen=True)
@@ -157,8 +159,9 @@ def _spec(path: Path, name: str, service: dict[str, Any], awaited: set[str]) -> 
     if not isinstance(scale, int) or scale < 0:
         raise ComposeError(f"{where}.scale: {scale!r}, expected 0 or more")
     volumes = [str(volume).split(":") for volume in service.get("volumes", [])]
-    if any(len(volume) < 2 or "/" in volume[0] for volume in volumes):
-        raise ComposeError(f"{where}.volumes: expected NAME:/folder for each")
+    if any(len(volume) < 2 or not volume[1].startswith("/") for volume in volumes):
+        raise ComposeError(f"{where}.volumes: expected NAME:/folder or ./FOLDER:/folder for each")
+    mounted = {inside: outside for outside, inside, *_ in volumes}
     return ServiceSpec(
         name=name,
         command=tuple(str(word) for word in command),
@@ -169,8 +172,18 @@ def _spec(path: Path, name: str, service: dict[str, Any], awaited: set[str]) -> 
         one_shot=name in awaited,
         restart=restart,
         stop_grace_s=_seconds(where, str(service.get("stop_grace_period", "10s"))),
-        volumes={volume[1]: volume[0] for volume in volumes},
+        volumes={inside: name for inside, name in mounted.items() if not _is_path(name)},
+        mounts={
+            inside: (path.parent / Path(outside).expanduser()).resolve()
+            for inside, outside in mounted.items()
+            if _is_path(outside)
+        },
     )
+
+
+def _is_path(outside: str) -> bool:
+    """Whether the left side of a volume is a folder of this machine, by the rule of Compose."""
+    return outside.startswith((".", "/", "~"))
 
 
 def _needs(service: dict[str, Any]) -> dict[str, str]:

@@ -17,13 +17,13 @@ from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.registry import DEFAULT
 from hmcs.task import Task, load_task, shipped_tasks
+from hmcs_local.compose import StackSpec
+from hmcs_local.stack import LAYERED
 
 PAGE = "page"
 PLAYED = ("synthetic", "simulated")
 """Sources that are moved by a model's learned paths."""
 RECORDED = "recorded"
-LAYERED = ("gesteme-classifier", "task-hmm")
-"""Services that run a model of the default kind, spread over processes."""
 _DEMO_ALONE = ("teach", *LAYERED)
 
 Environment = Mapping[str, Mapping[str, str | None]]
@@ -72,25 +72,24 @@ def own_task(
     return OwnTask(place, model, layered, source, played)
 
 
-def arranged(own: OwnTask, services: Sequence[str], models: Path, recordings: Path) -> Arrangement:
-    """Return how `services` of compose.yaml run for a task; models and recordings are folders."""
+def arranged(own: OwnTask, spec: StackSpec, models: Path, recordings: Path) -> Arrangement:
+    """Return how the stack of compose.yaml runs for a task; models and recordings are folders."""
     left_out = {"teach"} if own.layered else set(_DEMO_ALONE)
     model = None if own.model is None else str(own.model.resolve())
     file = [own.place] if Path(own.place).is_absolute() else []
+    changed: dict[str, dict[str, str | None]] = {
+        "input-device": input_environment(own.source, model, own.demonstration),
+        "gesteme-classifier": {"HMCS_MODEL": model},
+        "task-hmm": {"HMCS_MODEL": model},
+        "recognizer": {"HMCS_MODEL": None if own.layered else model},
+        "fixture-controller": {"HMCS_MODELS": json.dumps([model] if model else [])},
+        "console": {"HMCS_MODELS": json.dumps(_folders(models, model))},
+        "trainer": {"HMCS_SOURCES": json.dumps([str(recordings), *file])},
+        "recorder": {"HMCS_MODELS": json.dumps(_folders(models, model))},
+    }
     return Arrangement(
-        tuple(name for name in services if name not in left_out),
-        {
-            "input-device": input_environment(own.source, model, own.demonstration)
-            | {"HMCS_TASK": own.place},
-            "gesteme-classifier": {"HMCS_MODEL": model},
-            "task-hmm": {"HMCS_MODEL": model},
-            "recognizer": {"HMCS_MODEL": None if own.layered else model},
-            "fixture-controller": {"HMCS_MODELS": json.dumps([model] if model else [])},
-            "robot": {"HMCS_TASK": own.place},
-            "console": {"HMCS_TASK": own.place, "HMCS_MODELS": json.dumps(_folders(models, model))},
-            "trainer": {"HMCS_SOURCES": json.dumps([str(recordings), *file])},
-            "recorder": {"HMCS_MODELS": json.dumps(_folders(models, model))},
-        },
+        tuple(name for name in spec.usual if name not in left_out),
+        {name: changed.get(name, {}) | {"HMCS_TASK": own.place} for name in spec.services},
     )
 
 

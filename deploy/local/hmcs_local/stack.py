@@ -10,7 +10,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -20,6 +20,7 @@ import zenoh
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.bus.router import open_router
 from hmcs.errors import UserError
+from hmcs.task import load_task
 from hmcs_local.compose import ROUTER, ServiceSpec, StackSpec, find_compose, load_compose
 from hmcs_local.processes import StackProcess
 from hmcs_secure.closed_cell import ClosedCell
@@ -27,8 +28,9 @@ from hmcs_secure.closed_cell import ClosedCell
 ROUTER_IN_COMPOSE = "tcp/router:7447"
 """Where the services of compose.yaml look for the router; here it is the launcher's own."""
 DEFAULT_FOLDER = Path("out/up")
+LAYERED = ("gesteme-classifier", "task-hmm")
+"""Services that run a model of the default kind, spread over processes."""
 _ONE_SHOT_LOOK_S = 0.05
-_MODEL_VARIABLES = ("HMCS_MODEL", "HMCS_MODELS")
 
 
 class StackError(UserError):
@@ -242,10 +244,9 @@ class LocalStack:
         if any(spec.one_shot for spec in self._chosen):
             return []
         named = [
-            Path(word)
+            file
             for spec in self._chosen
-            for variable in _MODEL_VARIABLES
-            for word in _model_files(self._local_environment(spec, "", {}).get(variable, ""))
+            for file in _model_files(spec.name, self._local_environment(spec, "", {}))
         ]
         return [file for file in dict.fromkeys(named) if not file.exists()]
 
@@ -320,16 +321,25 @@ class LocalStack:
         return {key: value for key, value in given.items() if value is not None}
 
     def _local(self, spec: ServiceSpec, text: str) -> str:
-        for inside, volume in spec.volumes.items():
-            here = str(self.volume(volume)).replace("\\", r"\\")
+        places = {inside: self.volume(name) for inside, name in spec.volumes.items()}
+        for inside, place in (places | dict(spec.mounts)).items():
+            here = str(place).replace("\\", r"\\")
             text = re.sub(rf"(?<![\w./-]){re.escape(inside)}(?![\w.-])", here, text)
         return text.replace(ROUTER_IN_COMPOSE, self.router)
 
 
-def _model_files(text: str) -> list[str]:
-    """The model files in a setting: one, or a JSON list of files and folders."""
-    words = json.loads(text) if text.startswith("[") else [text]
-    return [word for word in words if word.endswith(".hmcs")]
+def _model_files(service: str, environment: Mapping[str, str]) -> Iterator[Path]:
+    """The model files that a service needs, from its settings.
+
+    Of a folder of models that is the file of the service's task, where it has nothing to do
+    without one.
+    """
+    words = [environment.get("HMCS_MODEL", ""), *json.loads(environment.get("HMCS_MODELS", "[]"))]
+    for place in map(Path, filter(None, words)):
+        if place.suffix == ".hmcs":
+            yield place
+        elif service in LAYERED and (task := environment.get("HMCS_TASK")):
+            yield place / f"{load_task(task).name}.hmcs"
 
 
 def with_free_port(endpoint: str) -> str:

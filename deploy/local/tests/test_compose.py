@@ -41,12 +41,16 @@ def test_grace_restart_scale_and_volumes_are_read(
 ) -> None:
     path = write_compose(
         it=service(
-            stop_grace_period="500ms", restart="on-failure", scale=3, volumes=["data:/data:ro"]
+            stop_grace_period="500ms",
+            restart="on-failure",
+            scale=3,
+            volumes=["data:/data:ro", "./tasks:/tasks:ro", "/srv/a:/a"],
         )
     )
     spec = load_compose(path, {}).services["it"]
     assert (spec.stop_grace_s, spec.restart, spec.scale) == (0.5, "on-failure", 3)
     assert spec.volumes == {"/data": "data"}
+    assert spec.mounts == {"/tasks": path.parent.resolve() / "tasks", "/a": Path("/srv/a")}
 
 
 def test_an_unknown_service_is_refused_with_the_valid_choices(
@@ -64,7 +68,7 @@ def test_an_unknown_service_is_refused_with_the_valid_choices(
         ({"environment": ["A=1"]}, r"services\.it\.environment: expected a mapping"),
         ({"restart": "sometimes"}, r"services\.it\.restart: 'sometimes'"),
         ({"stop_grace_period": "soon"}, r"services\.it\.stop_grace_period: 'soon'"),
-        ({"volumes": ["./here:/there"]}, r"services\.it\.volumes: expected NAME:/folder"),
+        ({"volumes": ["./here"]}, r"services\.it\.volumes: expected NAME:/folder or"),
         ({"scale": "many"}, r"services\.it\.scale: 'many'"),
         ({"depends_on": ["nobody"]}, "depends on 'nobody', which is not there"),
         ({"depends_on": ["it"]}, "services wait for each other"),

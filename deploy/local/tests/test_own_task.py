@@ -37,12 +37,12 @@ def test_without_a_model_nothing_of_the_demo_runs_and_the_page_moves_the_hand(
     task: Path, tmp_path: Path
 ) -> None:
     own = own_task(str(task), model=None, source=PAGE, demonstrations=())
-    services, environment = arranged(own, SERVICES, tmp_path / "models", tmp_path / "recordings")
+    services, environment = arranged(own, SPEC, tmp_path / "models", tmp_path / "recordings")
     assert set(services) == set(SERVICES) - DEMO_ALONE
     assert environment["input-device"]["HMCS_SOURCE"] == "page"
     assert environment["input-device"]["HMCS_DEMONSTRATION"] is None
-    for service in ("input-device", "robot", "console"):
-        assert environment[service]["HMCS_TASK"] == str(task)
+    assert {changed["HMCS_TASK"] for changed in environment.values()} == {str(task)}
+    assert set(environment) == set(SPEC.services)
     assert json.loads(environment["fixture-controller"]["HMCS_MODELS"] or "") == []
     # The trainer reads the task file though it lies in none of its folders.
     assert str(task) in json.loads(environment["trainer"]["HMCS_SOURCES"] or "")
@@ -57,7 +57,7 @@ def test_a_model_is_run_by_the_processes_of_its_kind(
 ) -> None:
     file = model_of(kind, tmp_path)
     own = own_task(str(task), model=file, source=PAGE, demonstrations=())
-    services, environment = arranged(own, SERVICES, tmp_path / "models", tmp_path / "recordings")
+    services, environment = arranged(own, SPEC, tmp_path / "models", tmp_path / "recordings")
     assert environment[runs]["HMCS_MODEL"] == str(file)
     assert runs in services
     assert waits not in services or environment[waits]["HMCS_MODEL"] is None
@@ -116,5 +116,5 @@ def test_what_does_not_go_together_is_refused_before_anything_is_read(
 
 def test_variables_that_reach_nobody_are_found() -> None:
     spec = load_compose(own_compose(), {})
-    environment = {"HMCS_SOURCE": "page", "HMCS_CELL": "a", "HMCS_DEADLINE_MS": "9", "HOME": "/"}
-    assert unheard(environment, spec.variables) == ["HMCS_SOURCE"]
+    environment = {"HMCS_SPEED": "2", "HMCS_CELL": "a", "HMCS_DEADLINE_MS": "9", "HOME": "/"}
+    assert unheard(environment, spec.variables) == ["HMCS_SPEED"]

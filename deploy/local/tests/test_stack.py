@@ -199,7 +199,9 @@ def test_a_service_gets_the_environment_of_compose_made_local(
         "HMCS_ROUTER": "tcp/router:7447",
         "HMCS_MODELS": '["/models", "/models/a.b", "/models-of-mine", "/my/models"]',
     }
-    described = service(PRINT_ENVIRONMENT, environment=environment, volumes=["m:/models:ro"])
+    environment["HMCS_TASK"] = "/tasks/mine.yaml"
+    volumes = ["m:/models:ro", f"{tmp_path}/mine:/tasks:ro"]
+    described = service(PRINT_ENVIRONMENT, environment=environment, volumes=volumes)
     described["command"].append("/models/x")
     with LocalStack(
         write_compose(a=described),
@@ -217,6 +219,7 @@ def test_a_service_gets_the_environment_of_compose_made_local(
     assert f"HMCS_ROUTER={router}" in said
     assert not router.endswith(":0")
     assert f'HMCS_MODELS=["{models}", "{models}/a.b", "/models-of-mine", "/my/models"]' in said
+    assert f"HMCS_TASK={tmp_path}/mine/mine.yaml" in said
     assert {"HMCS_SEED=3", "HMCS_INSTANCE=a-1", "OMP_NUM_THREADS=1"} <= set(said)
     assert not any(line.startswith("HMCS_CELL=") for line in said)
 

@@ -10,7 +10,7 @@ from hmcs.bus.service import UserError
 from hmcs.fixtures.controller.interface import Guides
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import ModelFileError, load_model, model_files
+from hmcs.recognition.model_file import ModelFileError, load_model, model_file_of, model_files
 
 MOST_LENT = 32
 """So many recognizers of other names may stand on loaded models; the oldest one goes first."""
@@ -76,16 +76,17 @@ def content_of(loaded: Loaded) -> bytes:
 
 
 def load_models(
-    places: Iterable[Path], model_key: Path | None = None
+    places: Iterable[Path], model_key: Path | None = None, task: str | None = None
 ) -> dict[str, tuple[Model, Path]]:
     """Return the models in files, and in folders of `*.hmcs` files, by name, each with its file.
 
-    Raises ModelFileError for a file that cannot be used, UserError for a folder without files and
-    for two different models of one name.
+    With a task, its model alone is taken of a folder, if it is there. Raises ModelFileError for a
+    file that cannot be used, UserError for a folder without files and for two different models of
+    one name.
     """
     models: dict[str, tuple[Model, Path]] = {}
     for place in places:
-        for file in model_files(place):
+        for file in _files_in(place, task):
             model = load_model(file, verify=signed_by(model_key))
             known, _ = models.setdefault(model.name, (model, file))
             if known.hash != model.hash:
@@ -94,3 +95,10 @@ def load_models(
                     "out, or train it under another name"
                 )
     return models
+
+
+def _files_in(place: Path, task: str | None) -> list[Path]:
+    if task is None:
+        return model_files(place)
+    file = model_file_of(place, task)
+    return [] if file is None else [file]

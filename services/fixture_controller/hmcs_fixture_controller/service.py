@@ -77,7 +77,7 @@ class FixtureController(Service):
         self._paired: Pairing | None = None
         self._pairings: Publisher[Pairing] | None = None
         self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
-        for model, file in load_models(settings.models, settings.model_key).values():
+        for model, file in load_models(settings.models, settings.model_key, settings.task).values():
             self._adopt(Loaded(model, guides_of(model), file))
         if settings.active_model is not None:
             self._follow(settings.active_model)

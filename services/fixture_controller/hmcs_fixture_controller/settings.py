@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from hmcs.bus.service import ServiceSettings
+from hmcs.bus.settings import EMPTY_IS_NONE, ServiceSettings
 from hmcs.fixtures.controller.rules import Safeguards
 
 Milliseconds = Annotated[float, Field(gt=0, le=1000)]
@@ -18,6 +18,8 @@ class FixtureControllerSettings(ServiceSettings):
 
     models: tuple[Path, ...] = ()
     """Model files, or folders of them; each lends its paths to the recognizer of its name."""
+    task: Annotated[str | None, EMPTY_IS_NONE] = None
+    """Name or file of a task: of folders in `models` its model alone is taken, if it is there."""
     active_model: str | None = None
     """Name of the recognizer followed first; by default the first one heard."""
     input_stale_after_ms: Milliseconds = 80.0

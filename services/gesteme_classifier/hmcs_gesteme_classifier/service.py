@@ -10,8 +10,7 @@ from hmcs.bus.messages import Evidence
 from hmcs.bus.service import Service, UserError
 from hmcs.bus.session import Bus
 from hmcs.bus.step_feed import FedStep, StepFeed
-from hmcs.model_signing import signed_by
-from hmcs.recognition.model_file import load_model
+from hmcs.layered_start import layered_model
 from hmcs.recognition.segment_filter.recognizer import bank_of, segment_filter_model
 from hmcs.translation import evidence_message, step_of
 from hmcs_gesteme_classifier.settings import GestemeClassifierSettings
@@ -31,7 +30,7 @@ class GestemeClassifier(Service):
 
     def __init__(self, settings: GestemeClassifierSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
+        self._model = layered_model(settings.model, settings.task, settings.model_key)
         self._named = _named(settings.gestemes, self._model.gesteme_names, settings.model)
         self._evidence = bus.publisher(
             Evidence, bus.keys.evidence(self._model.name, bus.source.instance)

@@ -25,6 +25,7 @@ from hmcs.bus.verbs import LAST_STEPS, PLAY
 from hmcs.driving import FollowingRobot, heard_robot
 from hmcs.motion.steps import DeadZone
 from hmcs.task import load_task
+from hmcs_input_device.automatic import chosen
 from hmcs_input_device.frames import frame_of
 from hmcs_input_device.guarded import Guarded
 from hmcs_input_device.kept_steps import KeptSteps
@@ -55,8 +56,9 @@ class InputDevice(Service):
     settings: InputDeviceSettings
 
     def __init__(self, settings: InputDeviceSettings, bus: Bus, log: logging.Logger) -> None:
-        super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
+        settings = chosen(settings, self._task)
+        super().__init__(settings, bus, log)
         self._dead_zone_m = settings.dead_zone_m or self._task.dead_zone_m
         self._source: Source = open_source(settings, self._task, BUILT_IN)
         self._guarded = Guarded(self._source, settings.source)

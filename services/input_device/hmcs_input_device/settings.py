@@ -79,7 +79,8 @@ class InputDeviceSettings(ServiceSettings):
     """Name of a task that comes along, or path of a task file."""
     source: str = "synthetic"
     """`recorded`, `synthetic`, `simulated`, `recording`, `page`, a device (`gamepad`, `spacemouse`,
-    `keyboard`, `mouse`), or the name of one that another distribution adds."""
+    `keyboard`, `mouse`), or the name of one that another distribution adds. `auto` is `recorded`
+    where `demonstration` is a file that is there, else `page`."""
     dead_zone_m: float | None = Field(default=None, gt=0, le=0.2)
     """δ: the shortest motion that counts as a step; the task's by default."""
     task_frame_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
@@ -115,7 +116,7 @@ class InputDeviceSettings(ServiceSettings):
 
     demonstration: Path | None = None
     """CSV file: what `recorded` plays, and what the operator of `synthetic` or `simulated` means
-    to do."""
+    to do. With `auto` it may be a folder: the file in it that is named as the task."""
     model: Path | None = None
     """Model file whose learned paths the operator of `synthetic` or `simulated` means to follow."""
     operator: Literal["steady", "novice", "tremor", "hurried"] = "steady"

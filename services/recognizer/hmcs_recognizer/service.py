@@ -15,8 +15,8 @@ from hmcs.bus.session import Bus, RequestRefusedError
 from hmcs.bus.verbs import LOAD_MODEL
 from hmcs.model_signing import signed_by
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import asked_model, load_model
-from hmcs.recognition.registry import recognizer_of
+from hmcs.recognition.model_file import asked_model, load_model, model_file_of
+from hmcs.recognition.registry import DEFAULT, recognizer_of
 from hmcs_recognizer.hosted import Hosted
 from hmcs_recognizer.settings import RecognizerSettings
 
@@ -35,8 +35,7 @@ class RecognizerService(Service):
         super().__init__(settings, bus, log)
         self._hosted: dict[str, Hosted] = {}
         self._files = ThreadPoolExecutor(1, thread_name_prefix="files")
-        if settings.model is not None:
-            model = load_model(settings.model, verify=signed_by(settings.model_key))
+        if (model := _first_model(settings)) is not None:
             self._hosted[model.name] = self._host(model)
 
     def start(self) -> None:
@@ -98,3 +97,11 @@ class RecognizerService(Service):
     def _begin(self, hosted: Hosted) -> None:
         self._hosted[hosted.model.name] = hosted
         hosted.begin()
+
+
+def _first_model(settings: RecognizerSettings) -> Model | None:
+    """Return the model to begin with; None where there is none yet, or others run it."""
+    if settings.model is None or (file := model_file_of(settings.model, settings.task)) is None:
+        return None
+    model = load_model(file, verify=signed_by(settings.model_key))
+    return None if settings.model.is_dir() and model.recognizer == DEFAULT else model

@@ -168,3 +168,18 @@ def test_of_a_layered_model_it_tells_the_evidence_its_beliefs_stand_on(
 def test_without_a_model_it_waits_to_be_given_one() -> None:
     assert RecognizerSettings(model="").model is None
     assert RecognizerSettings().model is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "hosted"), [("task-hmm", ["lesson"]), ("segment-filter", []), (None, [])]
+)
+def test_of_a_folder_it_begins_with_the_tasks_model_unless_layered_processes_run_it(
+    tmp_path: Path, kind: str | None, hosted: list[str]
+) -> None:
+    if kind is not None:
+        model = learn(lesson_task(), [performed(1), performed(2)], recognizer=kind)
+        save_model(model, tmp_path / "human-shapes.hmcs")
+    with Stack(tmp_path / "stack") as stack:
+        settings = RecognizerSettings(model=tmp_path, task="human-shapes")
+        service = RecognizerService(settings, stack.open_bus("recognizer", "here"), LOG)
+        assert service.facts()["model"].split() == hosted

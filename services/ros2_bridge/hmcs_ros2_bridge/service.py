@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import time
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from hmcs.bus.messages.message import Message
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model_file import load_model, model_file_of
 from hmcs.task import load_task
 from hmcs_ros2_bridge import scene
 from hmcs_ros2_bridge.fields import Fields
@@ -52,7 +51,8 @@ class Ros2Bridge(Service):
     def __init__(self, settings: Ros2BridgeSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
         self._task = load_task(settings.task)
-        self._models = [load_model(Path(path)) for path in settings.models]
+        files = (model_file_of(place, settings.task) for place in settings.models)
+        self._models = [load_model(file) for file in files if file is not None]
         self._node = Node(settings.node, settings.ros_args)
         self._ros: dict[str, Publisher] = {
             name: self._node.publisher(topic) for name, topic in TOPICS.items()

@@ -15,7 +15,7 @@ class Ros2BridgeSettings(ServiceSettings):
     task: str = "human-shapes"
     """Name of a task that comes along, or path of a task file: workspace and regions to show."""
     models: tuple[Path, ...] = ()
-    """Model files whose learned paths are shown as guides."""
+    """Model files whose learned paths are shown as guides; of a folder, the one named as `task`."""
     base_frame: str = Field(default="base_link", min_length=1)
     """The robot's base in ROS."""
     operator_frame: str = Field(default="operator", min_length=1)

@@ -11,8 +11,7 @@ from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received
 from hmcs.bus.step_feed import FedStep, StepFeed
 from hmcs.bus.timers import Timer
-from hmcs.model_signing import signed_by
-from hmcs.recognition.model_file import load_model
+from hmcs.layered_start import layered_model
 from hmcs.recognition.segment_filter.recognizer import (
     SegmentFilterRecognizer,
     TaskFilter,
@@ -34,7 +33,7 @@ class TaskFilterService(Service):
 
     def __init__(self, settings: TaskFilterServiceSettings, bus: Bus, log: logging.Logger) -> None:
         super().__init__(settings, bus, log)
-        self._model = load_model(settings.model, verify=signed_by(settings.model_key))
+        self._model = layered_model(settings.model, settings.task, settings.model_key)
         self._recognizer = TaskFilter(self._model)
         self._warming: SegmentFilterRecognizer | None = None
         self._gathering = Gathering(

@@ -46,7 +46,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="learn even from what no hand seems to have made: jumps, other units",
     )
     parser.add_argument("--report", help="the page to write on what the model is worth")
+    parser.add_argument(
+        "--stack-task",
+        metavar="TASK",
+        help="the task that a stack is brought up for: where it is another one, nothing is learned",
+    )
     given = parser.parse_args(words)
+    if given.stack_task not in (None, given.task):
+        print(f"nothing to learn: the stack is for {given.stack_task}", file=sys.stderr)
+        return 0
     if bool(given.performance) != bool(given.performance_output):
         parser.error("--performance and --performance-output go together")
     try:

@@ -128,3 +128,11 @@ def test_settings_that_make_no_model_are_reported_and_nothing_is_written(setting
     with pytest.raises(UserError), np.errstate(all="ignore"):
         train(TASK, TWO_OF_EACH, tmp_path / "m.hmcs", settings={name: value})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_learned_for_a_stack_of_another_task(tmp_path, capfd):
+    output = tmp_path / "m.hmcs"
+    words = [TASK, *TWO_OF_EACH, "--output", str(output), "--stack-task"]
+    assert main([*words, "/tasks/mine.yaml"]) == 0
+    assert "the stack is for /tasks/mine.yaml" in capfd.readouterr().err
+    assert not output.exists()

@@ -33,7 +33,7 @@ from hmcs.bus.rights import rights_of, roles
 from hmcs.bus.session import Bus, StoppedError
 from hmcs.bus.settings import ServiceSettings, as_yaml, load_settings
 from hmcs.bus.verbs import DESCRIBE, HEALTH, SETTINGS
-from hmcs.errors import UserError
+from hmcs.errors import NothingToDoError, UserError
 
 __all__ = ["CannotGoOnError", "Service", "ServiceSettings", "UserError", "run", "serve"]
 
@@ -81,8 +81,8 @@ class Service:
 def run(service_type: type[Service], argv: Sequence[str] | None = None) -> int:
     """Live as a service of `service_type`; return the exit code.
 
-    0 after SIGTERM, SIGINT, `--help` or `--print-settings`; 1 where starting failed unexpectedly;
-    2 for a mistake of the user, with one message on stderr.
+    0 after SIGTERM, SIGINT, `--help` or `--print-settings`, and where starting found nothing to do;
+    1 where starting failed unexpectedly; 2 for a mistake of the user, with one message on stderr.
     """
     try:
         settings, print_only = load_settings(service_type.Settings, service_type.name, argv)
@@ -166,6 +166,8 @@ def _run(
             serve(service_type, settings, bus, log, stop)
     except StoppedError:
         pass
+    except NothingToDoError as reason:
+        log.info("nothing to do", extra={"reason": str(reason)})
     except (UserError, KeyNameError):
         raise
     except Exception:

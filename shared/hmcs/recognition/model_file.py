@@ -30,7 +30,7 @@ from hmcs.recognition.serialization import (
     from_arrays,
     to_arrays,
 )
-from hmcs.task import Task
+from hmcs.task import Task, load_task
 from hmcs.task.values import Name
 from hmcs.whole_files import written_whole
 
@@ -98,6 +98,20 @@ def model_files(place: Path, *, may_be_empty: bool = False) -> list[Path]:
             f"{place}: no model file (*.hmcs) in this folder: make one with `hmcs train`"
         )
     return files
+
+
+def model_file_of(place: Path, task: str | None) -> Path | None:
+    """Return a model file: `place`, or of a folder the file named as a task, if it has that file.
+
+    `task` is a name or a file, as of `load_task`. Raises UserError for a folder without a task,
+    TaskFileError for a task that cannot be read.
+    """
+    if not place.is_dir():
+        return place
+    if task is None:
+        raise UserError(f"{place}: a folder of models: name the task whose model it is to be")
+    file = place / f"{load_task(task).name}.hmcs"
+    return file if file.is_file() else None
 
 
 def asked_model(path: str) -> Path:

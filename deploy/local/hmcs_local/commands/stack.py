@@ -85,9 +85,9 @@ def up(
     With a task and neither demonstrations nor a model it waits to be taught on the page, and what
     is trained and activated there is followed at once. With --secure every process comes with its
     certificate, and the router refuses everybody else. Ctrl-C ends them all. `${NAME}` in
-    compose.yaml is taken from the environment.
+    compose.yaml is taken from the environment; HMCS_TASK there is the same as TASK.
     """
-    from hmcs_local.bringing_up import Wanted, arrangement_of
+    from hmcs_local.bringing_up import Wanted, arrangement_of, task_named
     from hmcs_local.compose import find_compose, load_compose
     from hmcs_local.connecting import open_operator
     from hmcs_local.demonstration_files import expanded
@@ -111,6 +111,7 @@ def up(
             "given; `hmcs up --help` lists what can be changed"
         )
     named, files = _one_task(task, task_option), tuple(expanded(demonstrations or ()))
+    named = named or task_named(os.environ)
     wanted = Wanted(named, files, model, source, recognizer)
     arrangement = arrangement_of(spec, folder, wanted, typer.echo)
 
