@@ -9,7 +9,7 @@ import shutil
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,10 +39,17 @@ class Assisted(NamedTuple):
 class Containers:
     """One compose project of the stack, reached at a port of its own.
 
-    `closed` is the folder of a cell that the stack is to be closed in.
+    `closed` is the folder of a cell that the stack is to be closed in, `variables` are more of
+    compose.yaml's.
     """
 
-    def __init__(self, compose: list[str], port: int, closed: Path | None = None) -> None:
+    def __init__(
+        self,
+        compose: list[str],
+        port: int,
+        closed: Path | None = None,
+        variables: Mapping[str, str] | None = None,
+    ) -> None:
         self.project = f"hmcs-test-{secrets.token_hex(3)}"
         self.cell = CELL
         self.port = port
@@ -57,6 +64,7 @@ class Containers:
             "HMCS_CELL": self.cell,
             # On a machine that also builds and starts containers, late is not yet missing.
             "HMCS_DEADLINE_MS": "500",
+            **(variables or {}),
         }
 
     def compose(self, *words: str, timeout_s: float = COMMAND_TIMEOUT_S) -> str:
@@ -139,9 +147,18 @@ def closed_cell() -> ClosedCell | None:
 
 
 @pytest.fixture(scope="module")
-def containers(built: list[str], closed_cell: ClosedCell | None) -> Iterator[Containers]:
+def variables() -> Mapping[str, str]:
+    """More variables of compose.yaml; a module of tests may give some."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def containers(
+    built: list[str], closed_cell: ClosedCell | None, variables: Mapping[str, str]
+) -> Iterator[Containers]:
     """The stack, up; taken down with its volumes afterwards, whatever happened."""
-    stack = Containers(built, free_port(), closed_cell and closed_cell.authority.folder)
+    closed = closed_cell and closed_cell.authority.folder
+    stack = Containers(built, free_port(), closed, variables)
     try:
         stack.compose("up", "--detach", "--no-build")
         yield stack
