@@ -109,6 +109,8 @@ CHAPTER_2: tuple[Figure[Any], ...] = (
         "Force over error for toggle, fade and hold; the mark is where the cue is given.",
         force_scaling,
         ForceSettings(),
+        {"repeats": 3},
+        stand_in=_PEOPLE,
     ),
     Figure(
         "2.15",
