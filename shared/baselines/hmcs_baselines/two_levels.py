@@ -21,7 +21,12 @@ from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.recognizer import Recognition
 from hmcs.recognition.registry import TrainingData
 from hmcs.recognition.segmentation import StateSegment, edges_where, segments_between
-from hmcs.recognition.segments import LabeledSteps, labeled_steps
+from hmcs.recognition.segments import (
+    LabeledSteps,
+    LearningError,
+    labeled_steps,
+    segments_of,
+)
 from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
 from hmcs_baselines.classifying import (
@@ -45,6 +50,7 @@ from hmcs_baselines.task_level import (
 )
 
 Evidence = Literal["winner", "soft", "none"]
+Confusions = Literal["training", "held-out"]
 
 
 class LayeredHmmSettings(NamedTuple):
@@ -69,6 +75,10 @@ class LayeredHmmSettings(NamedTuple):
     often the task visits them."""
     task: TaskLevelSettings = TaskLevelSettings()
     """How the task HMM is learned."""
+    confusions: Confusions = "training"
+    """From what the task HMM learns how gestemes are confused: what the gesteme HMMs say of the
+    demonstrations they were learned from (training), or what others, learned without it, say of
+    each (held-out; stacked generalization, Wolpert 1992). The former is as in the thesis."""
 
 
 class TwoLevels(NamedTuple):
@@ -88,25 +98,48 @@ def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLev
     The task HMM is trained on what the gesteme HMMs pass up of whole demonstrations, restarted as
     they will be, so that it expects their mistakes; where restarts are given, at the labels.
     """
-    task = data.task
-    gestemes = learn_gestemes(
+    task, gestemes = data.task, _learned_gestemes(data, settings)
+    if settings.evidence == "none":
+        return TwoLevels(gestemes, None, settings.restart, settings.cusum, "none")
+    outputs = []
+    for number, demonstration in enumerate(data.demonstrations):
+        labeled = labeled_steps(task, demonstration)
+        classifying = gestemes
+        if settings.confusions == "held-out":
+            classifying = _learned_without(number, data, settings) or gestemes
+        classifier = GestemeHmmClassifier(
+            classifying, axes_of(task), settings.restart, settings.cusum
+        )
+        passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
+        outputs.append(GestemeLevelOutput(np.array(passed), labeled.states))
+    data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
+    task_hmm = learn_task_level(chain_of(task), outputs, settings.task)
+    return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
+
+
+def _learned_gestemes(data: TrainingData, settings: LayeredHmmSettings) -> Gestemes:
+    return learn_gestemes(
         data,
         settings.observations,
         settings.observing,
         settings.gestemes,
         complete=settings.restart == "network",
     )
-    if settings.evidence == "none":
-        return TwoLevels(gestemes, None, settings.restart, settings.cusum, "none")
-    outputs = []
-    for demonstration in data.demonstrations:
-        labeled = labeled_steps(task, demonstration)
-        classifier = GestemeHmmClassifier(gestemes, axes_of(task), settings.restart, settings.cusum)
-        passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
-        outputs.append(GestemeLevelOutput(np.array(passed), labeled.states))
-    data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
-    task_hmm = learn_task_level(chain_of(task), outputs, settings.task)
-    return TwoLevels(gestemes, task_hmm, settings.restart, settings.cusum, settings.evidence)
+
+
+def _learned_without(
+    number: int, data: TrainingData, settings: LayeredHmmSettings
+) -> Gestemes | None:
+    """The gesteme HMMs of all demonstrations but one; None where those lack a gesteme."""
+    others = (*data.demonstrations[:number], *data.demonstrations[number + 1 :])
+    data.progress(f"gesteme HMMs without demonstration {number + 1}")
+    try:
+        segments = segments_of(data.task, others)
+        return _learned_gestemes(
+            data._replace(demonstrations=others, segments=tuple(segments)), settings
+        )
+    except LearningError:
+        return None
 
 
 def passed_up(classification: Classification, evidence: Evidence) -> Array:

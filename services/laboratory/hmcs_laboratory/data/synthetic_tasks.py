@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ from hmcs.motion.demonstrations import Demonstration
 from hmcs.motion.operators import joined
 from hmcs.motion.references import References, random_gesteme, random_gestemes, turn_rad
 from hmcs.recognition.segments import LearningError, segments_of
-from hmcs_laboratory.data.hands import Count, CurveSettings, Positive, moved
+from hmcs_laboratory.data.hands import Count, CurveSettings, NotNegative, Positive, moved
 from hmcs_laboratory.data.tasks import TaskSet, as_performance, sequential_task
 
 FIVE_STATES = ("l1", "c1", "l2", "c1", "l3")
@@ -36,6 +37,8 @@ class TaskSettings(CurveSettings):
     dead_zone_m: Positive = 0.01
     """Of the recognizer. Far below `step_m` every sample of the hand is a step, but for those
     that err to almost nothing; the thesis leaves open which it took."""
+    alike_deg: NotNegative | None = None
+    """Of the five-state task: l3 goes so little off l1 that they are confused; by lot if None."""
     samples_per_step: Count = 1
     """Above 1 the hand's path is interpolated so finely, and the dead zone makes the steps."""
 
@@ -124,6 +127,35 @@ def random_curves(
             return curves
 
 
+def _with_alike(
+    curves: dict[str, Array],
+    kinds: Mapping[str, References],
+    orders: Sequence[Sequence[str]],
+    alike_rad: float,
+    rng: np.random.Generator,
+) -> dict[str, Array]:
+    """Draw curves until l3, turned off l1 by `alike_rad`, still turns away from what it follows."""
+    while True:
+        length_m = float(np.linalg.norm(curves["l3"][-1]) / np.linalg.norm(curves["l1"][-1]))
+        axis = _normal_of(curves["l1"], kinds["l1"].dimensions, rng)
+        turned = dict(curves) | {"l3": length_m * _turned(curves["l1"], alike_rad, axis)}
+        if all(
+            turn_rad(turned[a], turned[b]) >= kinds[b].least_turn_rad
+            for order in orders
+            for a, b in pairwise(order)
+        ):
+            return turned
+        curves = random_curves(kinds, orders, rng)
+
+
+def _normal_of(line: Array, dimensions: int, rng: np.random.Generator) -> Array:
+    """A unit vector across a line: out of the plane or, in space, drawn by lot."""
+    if dimensions == 2:
+        return np.array([0.0, 0.0, 1.0])
+    axis = np.cross(line[-1], rng.normal(size=3))
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
 def _similar(
     points: Array, dimensions: int, size: float, turn_rad: float, rng: np.random.Generator
 ) -> Array:
@@ -132,10 +164,14 @@ def _similar(
     if dimensions == 3:
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-    # Rodrigues' formula.
+    return factor * _turned(points, angle, axis)
+
+
+def _turned(points: Array, angle: float, axis: Array) -> Array:
+    """Points turned about a unit vector, by Rodrigues' formula."""
     across = np.cross(axis, points)
     turned = points + np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)
-    return np.asarray(factor * turned)
+    return np.asarray(turned)
 
 
 def _performed_task(
@@ -153,6 +189,8 @@ def _performed_task(
     }
     for _ in range(_DRAWS):
         curves = random_curves(kinds, orders, rng)
+        if settings.alike_deg is not None:
+            curves = _with_alike(curves, kinds, orders, math.radians(settings.alike_deg), rng)
         made = _performances(name, settings, orders[0], curves, noise, rng)
         try:
             segments_of(made.task, made.demonstrations)

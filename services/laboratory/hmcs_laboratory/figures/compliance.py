@@ -113,7 +113,10 @@ def optimal_compliance_found(settings: ComplianceSettings, rng: np.random.Genera
                 results[0, t, c, k] = MM * np.sqrt((_off(robot, meant) ** 2).mean())
                 results[1, t, c, k] = _PERIOD_S * len(robot)
     picture = new_picture(4.6)
-    numbers: dict[str, Any] = {"compliances": compliances.tolist()}
+    numbers: dict[str, Any] = {
+        "compliances": compliances.tolist(),
+        "guidance": [1.0, *GUIDANCES],
+    }
     sentences = []
     for ax, what, values, unit in zip(
         picture.subplots(1, 2), ("error", "time"), results, ("mm", "s"), strict=True

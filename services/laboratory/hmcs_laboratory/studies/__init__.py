@@ -17,6 +17,7 @@ from hmcs_laboratory.studies.gestemes import (
     PEERS,
     TRAINING_COUNT,
 )
+from hmcs_laboratory.studies.misclassified import MISCLASSIFIED
 from hmcs_laboratory.studies.scale import SCALE
 from hmcs_laboratory.studies.symbols import SYMBOL_COUNT
 from hmcs_laboratory.studies.tasks import LASA_TASKS, ORDER, RESTART
@@ -32,6 +33,7 @@ STUDIES: tuple[Study[Any], ...] = (
     SYMBOL_COUNT,
     PARTIAL,
     RESTART,
+    MISCLASSIFIED,
     ORDER,
     SCALE,
     LASA,

@@ -133,7 +133,7 @@ CHAPTER_4: tuple[Figure[Any], ...] = (
         "A 2D trajectory of the gestemes l1, c1, l2, c1, l3, one a state. c1 is exactly the same "
         "in S2 and S4, so gesteme classifiers alone cannot tell these states apart.",
         five_state_task,
-        TaskFigureSettings(performances=10),
+        TaskFigureSettings(performances=10, noise=0.25, alike_deg=12.0),
         _FAST_TASK,
     ),
     Figure(
@@ -144,7 +144,7 @@ CHAPTER_4: tuple[Figure[Any], ...] = (
         "confused, and the task HMM is right all the same. The difference between the two most "
         "probable states is larger than between the two most probable gestemes.",
         five_states_followed,
-        FollowedSettings(performances=10),
+        FollowedSettings(performances=10, noise=0.25, alike_deg=12.0, confusions="held-out"),
         _FAST_TASK,
         data_of="4.11",
     ),
@@ -155,7 +155,14 @@ CHAPTER_4: tuple[Figure[Any], ...] = (
         "three demonstrations. Gesteme HMMs are sometimes wrong and the layered HMM still finds "
         "the state; the total likelihood drops rapidly when an unexpected gesteme is identified.",
         five_states_followed,
-        FollowedSettings(dimensions=3, demonstrations=3, performances=10),
+        FollowedSettings(
+            dimensions=3,
+            demonstrations=3,
+            performances=10,
+            noise=0.25,
+            alike_deg=12.0,
+            confusions="held-out",
+        ),
         _FAST_TASK,
         stand_in="The thesis recorded a force-controlled manipulator led by hand. Here the "
         "simulated operator performs the five-state task in space; as in the thesis from three "
