@@ -110,7 +110,9 @@ def learn_two_levels(data: TrainingData, settings: LayeredHmmSettings) -> TwoLev
         classifier = GestemeHmmClassifier(
             classifying, axes_of(task), settings.restart, settings.cusum
         )
-        passed = [passed_up(classifier.step(step), settings.evidence) for step in _marked(labeled)]
+        passed = [
+            passed_up(classifier.step(step), settings.evidence) for step in with_marks(labeled)
+        ]
         outputs.append(GestemeLevelOutput(np.array(passed), labeled.states))
     data.progress("task HMM on what the gesteme HMMs say of the demonstrations")
     task_hmm = learn_task_level(chain_of(task), outputs, settings.task)
@@ -233,8 +235,8 @@ def segment_two_levels(
     )
 
 
-def _marked(labeled: LabeledSteps) -> Iterator[Step]:
-    """The steps, the pedal down where the label is another."""
+def with_marks(labeled: LabeledSteps) -> Iterator[Step]:
+    """Yield the steps, the pedal down where the label is another."""
     before = None
     for step, state, gesteme in zip(labeled.steps, labeled.states, labeled.gestemes, strict=True):
         yield step._replace(mark=(state, gesteme) != before)

@@ -11,18 +11,24 @@ from hmcs.motion.steps import Step, steps_of_demonstration
 from hmcs.recognition.hmm import inference
 from hmcs.recognition.hmm.log_transitions import LogTransitions
 from hmcs.recognition.learning import learn
-from hmcs.recognition.model import Model
+from hmcs.recognition.model import Model, axes_of
 from hmcs.recognition.model_file import load_model, save_model
 from hmcs.recognition.registry import recognizer_of, segmentation_of
 from hmcs.recognition.segmentation import label_of
 from hmcs.recognition.segments import labeled_steps
+from hmcs.recognition.task_chain import chain_of
 from hmcs.task import Task
+from hmcs_baselines.classifying import GestemeHmmClassifier
 from hmcs_baselines.gesteme_hmms import GestemeHmmSettings, GestemeScores
 from hmcs_baselines.layered_hmm import KIND
 from hmcs_baselines.observing import Observed, observations
 from hmcs_baselines.restarting import Restart
-from hmcs_baselines.task_level import TaskLevelSettings
-from hmcs_baselines.two_levels import LayeredHmmSettings
+from hmcs_baselines.task_level import (
+    GestemeLevelOutput,
+    TaskLevelSettings,
+    learn_task_level,
+)
+from hmcs_baselines.two_levels import LayeredHmmSettings, passed_up, with_marks
 from support.lessons import ROUND, lesson_task, performed, steps_performed
 
 GIVEN = LayeredHmmSettings(restart="given")
@@ -276,3 +282,48 @@ def test_knowledge_that_does_not_fit_its_task_is_refused(part: str, field: str) 
         )
     with pytest.raises(ValueError, match=field):
         KIND.check(knowledge, lesson_task())
+
+
+def test_held_out_confusions_are_those_of_gesteme_hmms_that_did_not_see_the_demonstration() -> None:
+    task, demonstrations = lesson_task(), [performed(seed) for seed in range(3)]
+    # One hand performs everything turned by 50°: the others do not prepare for it.
+    turn = np.deg2rad(50.0)
+    rotation = np.array(
+        [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    )
+    odd = demonstrations[2]
+    demonstrations[2] = odd._replace(positions=odd.positions @ rotation.T)
+    settings = LayeredHmmSettings(observations="md", restart="given")
+    outputs = []
+    for number, demonstration in enumerate(demonstrations):
+        others = [*demonstrations[:number], *demonstrations[number + 1 :]]
+        knowledge = learn(task, others, settings, recognizer="lhmm").knowledge
+        classifier = GestemeHmmClassifier(
+            knowledge.gestemes, axes_of(task), "given", settings.cusum
+        )
+        labeled = labeled_steps(task, demonstration)
+        passed = [passed_up(classifier.step(step), "winner") for step in with_marks(labeled)]
+        outputs.append(GestemeLevelOutput(np.array(passed), labeled.states))
+    expected = learn_task_level(chain_of(task), outputs, settings.task)
+    held_out = settings._replace(confusions="held-out")
+    found = learn(task, demonstrations, held_out, recognizer="lhmm").knowledge
+    seen = learn(task, demonstrations, settings, recognizer="lhmm").knowledge
+    np.testing.assert_allclose(found.task.gestemes, expected.gestemes, atol=1e-12)
+    assert not np.allclose(found.task.gestemes, seen.task.gestemes)
+    # What recognizes has learned from all demonstrations.
+    np.testing.assert_array_equal(
+        found.gestemes.hmms.chains.transition, seen.gestemes.hmms.chains.transition
+    )
+
+
+def test_one_demonstration_has_no_held_out_confusions_but_its_own() -> None:
+    own, held_out = (
+        learn(
+            lesson_task(),
+            [performed(1)],
+            LayeredHmmSettings(confusions=confusions),
+            recognizer="lhmm",
+        )
+        for confusions in ("training", "held-out")
+    )
+    np.testing.assert_array_equal(own.knowledge.task.gestemes, held_out.knowledge.task.gestemes)
