@@ -91,9 +91,15 @@ def draw_likelihoods(ax: Axes, seen: FollowedPath) -> None:
     ax.set_xlim(-0.5, len(seen.probabilities) - 0.5)
 
 
-def draw_matrix(ax: Axes, transition: Array) -> None:
-    """Draw a transition matrix, shape (K, K), with its numbers and on a logarithmic scale."""
+def draw_matrix(ax: Axes, transition: Array, order: Sequence[int] = ()) -> None:
+    """Draw a transition matrix, shape (K, K), with its numbers and on a logarithmic scale.
+
+    Rows and columns stand in the given order of the states, if any: of a sequence the successors
+    then stand beside the diagonal.
+    """
     count = len(transition)
+    order = list(order) or list(range(count))
+    transition = transition[np.ix_(order, order)]
     shown = np.maximum(transition, _LEAST_SHOWN)
     image = ax.imshow(shown, cmap="Blues", norm=LogNorm(_LEAST_SHOWN, 1.0))
     ax.grid(visible=False)
@@ -108,7 +114,7 @@ def draw_matrix(ax: Axes, transition: Array) -> None:
             color="white" if value > 1e-4 else INK,
             fontsize=9.5 if count <= 6 else 7.5,
         )
-    names = [str(k + 1) for k in range(count)]
+    names = [str(k + 1) for k in order]
     ax.set_xticks(range(count), names)
     ax.set_yticks(range(count), names)
     ax.set_xlabel("to state")

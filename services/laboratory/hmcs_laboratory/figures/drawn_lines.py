@@ -27,6 +27,7 @@ from hmcs_laboratory.figures.direction_following import (
     draw_likelihoods,
     draw_matrix,
     follow_path,
+    likely_order,
     moves_of,
     state_handles,
     taught_steps,
@@ -78,20 +79,23 @@ def drawn_matrix(settings: DrawnLinesSettings, rng: np.random.Generator) -> Draw
     transition = knowledge.transition
     count = len(transition)
     picture = new_picture(6.4, 7.2)
-    draw_matrix(picture.subplots(), transition)
+    order = likely_order(knowledge)
+    draw_matrix(picture.subplots(), transition, order)
     leaving = 1.0 - np.diag(transition)
     successors = [int((row > 0.01).sum()) - 1 for row in transition]
     numbers: dict[str, Number] = {
         "directions_found": count,
         "mean_steps_in_a_state": float(np.mean(1.0 / np.maximum(leaving, 1e-12)[leaving > 1e-6])),
         "successors": successors,
+        "order": [state + 1 for state in order],
     }
     found = (
         f"{counted(count, 'state')}, followed by {listed([str(n) for n in successors])} others "
         "with more than 1 % a step. States that several strokes share have several successors: no "
         "sequence is extracted."
         if max(successors) > 1
-        else f"{counted(count, 'state')}, each followed by one other at most."
+        else f"{counted(count, 'state')}, each followed by one other at most: in the order "
+        "in which one most probably follows the other, successors stand beside the diagonal."
     )
     return Drawn(picture, numbers, found, _DRAWN_DIFFERS.format(count=count))
 
