@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-from rich.table import Table
-from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recognition.model_file import load_model
@@ -33,6 +31,7 @@ from hmcs.recordings.replaying import Replay, kept_model, replayed
 from hmcs.shown import plain
 from hmcs.whole_files import written_whole
 from hmcs_local.connecting import Reached
+from hmcs_local.tables import show_table
 
 DRAWN_AS = (".png", ".svg")
 OPEN_LOOP = (
@@ -101,7 +100,7 @@ def replay_in_process(
         figures = {name: None if value != value else value for name, value in figures.items()}
         console.print(json.dumps(figures), soft_wrap=True, highlight=False, markup=False)
     else:
-        console.print(_side_by_side(file.name, replay, beliefs, fixtures))
+        _show_side_by_side(console, file.name, replay, beliefs, fixtures)
         for note in [*([OPEN_LOOP] if fixture.ticks else []), *notes]:
             console.print(f"note: {plain(note)}", highlight=False, markup=False)
 
@@ -128,24 +127,26 @@ def replay_live(file: Path, rate: float, task: str, to: Reached) -> int:
         return 0
 
 
-def _side_by_side(
-    title: str, replay: Replay, beliefs: Comparison, fixtures: FixtureComparison
-) -> Table:
+def _show_side_by_side(
+    console: Console,
+    title: str,
+    replay: Replay,
+    beliefs: Comparison,
+    fixtures: FixtureComparison,
+) -> None:
     """What was and what is, a line a figure; no line for what there is nothing of."""
     heading = (
         f"{title}: {beliefs.steps} steps in {replay.lasted_s:.1f} s; recorded "
         f"{replay.compared_with or 'nobody'}, replayed {replay.model.name}, "
         f"{beliefs.times_real:.0f} times as fast"
     )
-    table = Table(title=Text(plain(heading)), title_justify="left")
-    table.add_column("", no_wrap=True)
-    for name in ("recorded", "replayed", "side by side"):
-        table.add_column(name, justify="right", no_wrap=True)
+    rows = []
     for name, *cells in (*_belief_rows(beliefs), *_fixture_rows(fixtures)):
         shown = ["" if "nan" in cell else cell for cell in cells]
         if any(shown):
-            table.add_row(name, *shown)
-    return table
+            rows.append((name, *shown))
+    columns = ("recorded", "replayed", "side by side")
+    show_table(console, heading, ("", *columns), rows, columns)
 
 
 def _belief_rows(beliefs: Comparison) -> Iterator[tuple[str, str, str, str]]:

@@ -84,6 +84,20 @@ def test_the_same_model_is_found_to_have_believed_the_same(hmcs: Run, take: Path
     assert "nan" not in ended.stdout
 
 
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_what_was_and_what_is_stand_side_by_side_at_any_width(
+    hmcs: Run, take: Path, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    out = hmcs("replay", str(take)).stdout
+    assert out.replace("\n", "").isprintable()
+    table = out.partition("note:")[0]
+    assert all(len(line.rstrip()) <= width for line in table.splitlines())
+    for words in ("same belief, bit by bit", "robot beside its guide, mean", "recorded lesson"):
+        assert words in " ".join(table.split())
+    assert "…" not in table
+
+
 def test_every_figure_of_the_json_line_stands_in_the_help(
     hmcs: Run, take: Path, models: dict[str, Path]
 ) -> None:

@@ -151,7 +151,9 @@ def check(
     """Show every certificate and until when it is valid; exit code 1 where something is to do."""
     authority, now = _authority(folder, cell), utc_now()
     holders = holders_of(authority)
-    table = Table("holder", "valid until", "days left", "to do")
+    table = Table()
+    for column in ("holder", "valid until", "days left", "to do"):
+        table.add_column(column, overflow="fold")
     problems = 0
     for holder in holders:
         to_do = _to_do(holder, holder.days_left(now), within_days)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs_local.commands.options import (
     Columns,
@@ -18,6 +17,7 @@ from hmcs_local.commands.options import (
     Urdf,
     file_choices,
 )
+from hmcs_local.tables import screen
 
 FILES = (
     "CSV files, recordings, bags of ROS, LeRobot data sets, folders of them, patterns, "
@@ -59,7 +59,7 @@ def segment(
 
     choices = file_choices(topics, columns, units, time, urdf, link, marks)
     segment_files(
-        expanded(files), model, out=out, anywhere=anywhere, console=Console(), choices=choices
+        expanded(files), model, out=out, anywhere=anywhere, console=screen(), choices=choices
     )
 
 
@@ -84,7 +84,7 @@ def check(
     from hmcs_local.demonstration_files import expanded
 
     choices = file_choices(topics, columns, units, time, urdf, link, marks)
-    raise typer.Exit(0 if show_check(expanded(files), task, Console(), choices) else 2)
+    raise typer.Exit(0 if show_check(expanded(files), task, screen(), choices) else 2)
 
 
 def import_files(

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs_local.commands.options import Cell, Folder, Router, Secure
 from hmcs_local.stack import DEFAULT_FOLDER
+from hmcs_local.tables import screen
 
 
 def recognizers(
@@ -25,9 +25,9 @@ def recognizers(
     from hmcs_local.recognizers import show_kind, show_kinds
 
     if name is None:
-        show_kinds(kinds(), Console())
+        show_kinds(kinds(), screen())
     else:
-        show_kind(kind_named(name), Console())
+        show_kind(kind_named(name), screen())
 
 
 def swap(

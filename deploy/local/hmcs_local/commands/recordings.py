@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs_local.commands.options import Cell, Router, Secure
 from hmcs_local.commands.replies import tell_replies
+from hmcs_local.tables import screen
 
 
 def record(
@@ -62,7 +62,7 @@ def inspect(
     """
     from hmcs_local.recordings import show_inspection
 
-    whole = show_inspection(recording, Console(soft_wrap=True), as_json=as_json)
+    whole = show_inspection(recording, screen(), as_json=as_json)
     raise typer.Exit(0 if whole else 1)
 
 
@@ -95,7 +95,7 @@ def label(
         sets or [],
         clear=clear,
         task=load_task(task) if task else None,
-        console=Console(soft_wrap=True),
+        console=screen(),
     )
 
 
@@ -121,7 +121,7 @@ def export(
     """
     from hmcs_local.recordings import export_recording, export_to_others
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = screen()
     match form:
         case "csv" | "npz":
             export_recording(recording, to, form, console)
@@ -181,5 +181,5 @@ def replay(
     if live:
         to = reached("input_device", router, cell, secure)
         raise typer.Exit(replay_live(recording, rate, task, to))
-    console = Console(soft_wrap=True)
+    console = screen()
     replay_in_process(recording, model, Files(out, picture), console, as_json=as_json)

@@ -15,6 +15,7 @@ from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+from hmcs_local.tables import screen
 
 
 def up(
@@ -157,7 +158,7 @@ def status(
     from hmcs_local.status import show_status
 
     with open_observer(router, cell, secure) as bus:
-        well = show_status(bus, Console(), once=once)
+        well = show_status(bus, screen(), once=once)
     raise typer.Exit(0 if well else 1)
 
 
