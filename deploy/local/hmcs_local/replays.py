@@ -30,6 +30,7 @@ from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
 from hmcs.shown import plain
 from hmcs.whole_files import written_whole
+from hmcs.write_places import check_file_place
 from hmcs_local.connecting import Reached
 from hmcs_local.tables import show_table
 
@@ -49,6 +50,17 @@ class Files(NamedTuple):
     """PNG or SVG."""
 
 
+def check_files(files: Files) -> None:
+    """Raise UserError for a file that cannot be written, or a picture of no known kind."""
+    if files.picture is not None and files.picture.suffix.lower() not in DRAWN_AS:
+        raise UserError(f"--picture {files.picture}: expected a name that ends in .png or .svg")
+    for target, option in ((files.steps, "--out"), (files.picture, "--picture")):
+        if target is not None:
+            check_file_place(target, option)
+            if not target.parent.is_dir():
+                raise UserError(f"{option} {target}: there is no folder {target.parent}: make it")
+
+
 def replay_in_process(
     file: Path, model: Path | None, files: Files, console: Console, *, as_json: bool
 ) -> None:
@@ -57,13 +69,6 @@ def replay_in_process(
     Raises a UserError for a recording or model that cannot be used, or do not fit each other, and
     for a file that cannot be written; none of the files is written then.
     """
-    if files.picture is not None and files.picture.suffix.lower() not in DRAWN_AS:
-        raise UserError(f"--picture {files.picture}: expected a name that ends in .png or .svg")
-    for target in files:
-        if target is not None and target.is_dir():
-            raise UserError(f"{target}: is a folder: name a file in it")
-        if target is not None and not target.parent.is_dir():
-            raise UserError(f"{target}: there is no folder {target.parent}: make it first")
     content = read(file)
     chosen = kept_model(content) if model is None else load_model(model)
     with Progress(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ from hmcs_trainer.validation import findings
 
 
 def checked(
-    task: Task, references: Sequence[str], progress: Callable[[str], None]
+    task: Task, references: Iterable[str], progress: Callable[[str], None]
 ) -> tuple[int, int]:
     """Return how many demonstrations would be learned from, and how many findings were reported.
 
@@ -79,7 +79,7 @@ def sound(learned: Callable[[], Model]) -> Model:
 
 def train(
     task: str,
-    references: list[str],
+    references: Iterable[str],
     output: str | Path,
     *,
     name: str | None = None,
@@ -104,9 +104,9 @@ def train(
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
     as labels beside each file; that task is called `name`, or as the model's file. Demonstrations
     that no hand made are refused unless `accept_implausible`; those that are given twice count
-    once. `choices_of_files` say how files of other programs are read. Raises a UserError that says
-    what is wrong with the task, a reference, a demonstration, the name, the recognizer or a
-    setting.
+    once. `choices_of_files` say how files of other programs are read. `references` are asked for
+    when all else has been checked. Raises a UserError that says what is wrong with the task, a
+    reference, a demonstration, the name, the recognizer or a setting.
     """
     if name is not None:
         check_name("model", name)
@@ -173,7 +173,7 @@ def train(
 
 
 def _read(
-    task: Task, references: Sequence[str], files: Choices = AS_IT_IS, *, find_states: bool
+    task: Task, references: Iterable[str], files: Choices = AS_IT_IS, *, find_states: bool
 ) -> tuple[list[Source], list[Finding]]:
     """What the references name, each demonstration once, and what should be known of it."""
     sources, doubled = distinct(

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
-from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure
+from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure, note
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
 from hmcs_local.tables import screen
 
@@ -111,8 +111,8 @@ def up(
             f"hmcs: {name} in the environment reaches no process: {spec.path} says what each is "
             "given; `hmcs up --help` lists what can be changed"
         )
-    named, files = _one_task(task, task_option), tuple(expanded(demonstrations or ()))
-    named = named or task_named(os.environ)
+    named = _one_task(task, task_option) or task_named(os.environ)
+    files = tuple(expanded(demonstrations or (), folder, note))
     wanted = Wanted(named, files, model, source, recognizer)
     arrangement = arrangement_of(spec, folder, wanted, typer.echo)
 
