@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,9 +29,12 @@ from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
 from hmcs.shown import plain
+from hmcs.task import load_task
 from hmcs.whole_files import written_whole
 from hmcs.write_places import check_file_place
+from hmcs_local import guard
 from hmcs_local.connecting import Reached
+from hmcs_local.interrupts import interruptible
 from hmcs_local.tables import show_table
 
 DRAWN_AS = (".png", ".svg")
@@ -39,6 +42,8 @@ OPEN_LOOP = (
     "an open loop: hand and robot are where they were recorded, the hand did not react to "
     "what the fixture would have done"
 )
+_END_WITHIN_S = 5.0
+"""So long a live replay has to say goodbye when it is interrupted."""
 
 
 class Files(NamedTuple):
@@ -120,16 +125,30 @@ def _degraded(beliefs: Comparison) -> Iterator[str]:
 
 
 def replay_live(file: Path, rate: float, task: str, to: Reached) -> int:
-    """Be the input device of a cell that plays a recording; return its exit code."""
+    """Be the input device of a cell that plays a recording, to its end; return the exit code.
+
+    Ctrl-C ends it before, with the dead-man released.
+    """
     read(file)
+    load_task(task)
     command = [sys.executable, "-m", "hmcs_input_device", "--source", "recording"]
     command += ["--demonstration", str(file), "--speed", str(rate), "--task", task]
-    command += ["--router", to.router, "--cell", to.cell]
+    command += ["--router", to.router, "--cell", to.cell, "--exit-when-played"]
     tls = {f"HMCS_{name.upper()}": str(file) for name, file in to.tls.items()}
-    try:
-        return subprocess.run(command, env=os.environ | tls, check=False).returncode
-    except KeyboardInterrupt:
-        return 0
+    bound = [sys.executable, "-S", "-E", guard.__file__, str(os.getpid()), *command]
+    with interruptible():
+        # In a session of its own, so that it is ended by this process and not by the terminal.
+        device = subprocess.Popen(bound, env=os.environ | tls, start_new_session=True)
+        try:
+            return device.wait()
+        except KeyboardInterrupt:
+            device.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                device.wait(_END_WITHIN_S)
+            return 0
+        finally:
+            device.kill()
+            device.wait()
 
 
 def _show_side_by_side(
