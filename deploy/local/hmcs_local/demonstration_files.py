@@ -10,7 +10,7 @@ from hmcs.errors import UserError
 from hmcs.recordings.file_rotation import SUFFIX as RECORDING
 from hmcs.recordings.foreign.registry import ENDINGS as OTHER_PROGRAMS
 from hmcs.recordings.foreign.registry import is_recording_folder
-from hmcs_local.recorded_files import found_elsewhere, unknown_file_message
+from hmcs_local.recorded_files import check_folder, found_elsewhere, unknown_file_message
 from hmcs_trainer.references import DRAWINGS
 
 ENDINGS = (".csv", RECORDING, *OTHER_PROGRAMS)
@@ -20,14 +20,21 @@ LABELS = ".labels.csv"
 
 
 def expanded(references: Sequence[str], folder: Path, tell: Callable[[str], None]) -> Iterator[str]:
-    """Yield references with folders and patterns replaced by the files they stand for, by name.
+    """Return references with folders and patterns replaced by the files they stand for, by name.
 
     Recordings of `hmcs up` in `folder` may be given by their bare names; `tell` is given a line for
     each. All references are looked up when the first is asked for, so that options can be checked
     before. A file that is named twice is left in twice: training says so. Raises UserError for a
     folder or a pattern without demonstrations, and for a file that is not there, with the names
-    nearest to it.
+    nearest to it; at once for a folder that is none.
     """
+    check_folder(folder)
+    return _looked_up(references, folder, tell)
+
+
+def _looked_up(
+    references: Sequence[str], folder: Path, tell: Callable[[str], None]
+) -> Iterator[str]:
     yield from [file for each in references for file in _files_of(each, folder, tell)]
 
 

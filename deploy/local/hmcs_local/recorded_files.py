@@ -17,13 +17,21 @@ def recordings_in(folder: Path) -> Path:
     return folder / "recordings"
 
 
+def check_folder(folder: Path) -> None:
+    """Raise UserError where the folder of `hmcs up` can be none; one that is not there may be."""
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise UserError(f"--folder {folder}: {there.name} is no folder: name another one")
+
+
 def recording_named(name: Path, folder: Path, tell: Callable[[str], None]) -> Path:
     """Return the file of a recording; its ending may be left out.
 
     A bare name is looked for in the current folder, then where `hmcs up` of `folder` records.
     `tell` is given a line where the file is not `name` itself. Raises UserError where there is
-    none, with the names nearest to it.
+    none, with the names nearest to it, and for a folder that is none.
     """
+    check_folder(folder)
     found = found_elsewhere(name, folder) if not name.exists() else name
     if found is None:
         raise UserError(unknown_file_message(name, folder, (SUFFIX,)))

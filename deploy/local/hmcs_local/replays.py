@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from hmcs.errors import UserError
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model import Model
 from hmcs.recordings.comparing import (
     Comparison,
     FixtureComparison,
@@ -67,15 +67,16 @@ def check_files(files: Files) -> None:
 
 
 def replay_in_process(
-    file: Path, model: Path | None, files: Files, console: Console, *, as_json: bool
+    file: Path, model: Model | None, files: Files, console: Console, *, as_json: bool
 ) -> None:
     """Replay a recording, show how it stands to what was recorded, and write `files`.
 
-    Raises a UserError for a recording or model that cannot be used, or do not fit each other, and
-    for a file that cannot be written; none of the files is written then.
+    Without a model the one that is kept with the recording replays it. Raises a UserError for a
+    recording or model that cannot be used, or do not fit each other, and for a file that cannot be
+    written; none of the files is written then.
     """
     content = read(file)
-    chosen = kept_model(content) if model is None else load_model(model)
+    chosen = kept_model(content) if model is None else model
     with Progress(
         TextColumn("replaying"), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True)
     ) as progress:

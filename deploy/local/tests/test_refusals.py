@@ -120,6 +120,27 @@ def test_an_interrupt_while_the_command_is_loaded_ends_it_without_a_word(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("module", ["typer", "rich.text", "pydantic", "numpy", "hmcs_trainer"])
+def test_an_interrupt_at_any_import_leaves_no_traceback(module: str) -> None:
+    interrupts = f"""
+import os, signal, sys
+
+class Finder:
+    def find_spec(name, path, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder)
+sys.argv = ["hmcs", "task", "check", "human-shapes"]
+from hmcs_local.entry import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", interrupts], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 def test_what_takes_the_interrupt_is_loaded_before_anything_else() -> None:
     listed = "import hmcs_local.entry, sys; print('typer' in sys.modules, 'hmcs' in sys.modules)"
     done = subprocess.run(

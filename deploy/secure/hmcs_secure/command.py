@@ -11,6 +11,7 @@ from rich.table import Table
 
 from hmcs.bus.keys import check_name
 from hmcs.bus.rights import roles
+from hmcs.write_places import check_file_place
 from hmcs_secure.authority import (
     HOLDER_DAYS,
     Authority,
@@ -120,6 +121,8 @@ def router(
     folder: _Folder = DEFAULT_FOLDER,
 ) -> None:
     """Write a router's configuration: mutual TLS, default deny, the rules of every certificate."""
+    if output is not None:
+        check_file_place(output, "--output")
     authority = _authority(folder, cell)
     target = output or authority.folder / "router.json5"
     written = write_router_file(

@@ -198,6 +198,7 @@ def replay(
     `_takes_hold_later_ms` `_recorded_lets_go` `_replayed_lets_go` `_lets_go_later_ms`,
     `_times_real`; `notes` on what is missing. null where there is nothing to measure.
     """
+    from hmcs.recognition.model_file import load_model
     from hmcs_local.connecting import reached
     from hmcs_local.recorded_files import recording_named
     from hmcs_local.replays import Files, check_files, replay_in_process, replay_live
@@ -207,5 +208,6 @@ def replay(
         raise typer.Exit(replay_live(recording_named(recording, folder, note), rate, task, to))
     files = Files(out, picture)
     check_files(files)
+    given = None if model is None else load_model(model)
     file = recording_named(recording, folder, note)
-    replay_in_process(file, model, files, screen(), as_json=as_json)
+    replay_in_process(file, given, files, screen(), as_json=as_json)

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
+from hmcs.write_places import check_folder_place
 from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure, note
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
 from hmcs_local.tables import screen
@@ -98,6 +99,7 @@ def up(
     from hmcs_secure.closed_cell import find_closed_cell
     from hmcs_secure.router_file import DEFAULT_LISTEN
 
+    check_folder_place(folder, "--folder")
     if signed_models and not secure:
         raise UserError("--signed-models: name the closed cell whose key counts, by --secure")
     closed = find_closed_cell(secure, signed_models=signed_models) if secure else None

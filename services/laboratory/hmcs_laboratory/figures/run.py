@@ -103,17 +103,15 @@ def write(path: Path, content: bytes) -> None:
 
 
 def draw_study(study: Study[Any], rows: Sequence[Row], path: Path) -> None:
-    """Draw the rows of a study that has a picture to a file, .png or .svg.
+    """Draw the rows of a study that has a picture to a file, .svg by its ending or else PNG.
 
-    Raises UserError for another ending, and where the file cannot be written.
+    Raises UserError where the file cannot be written.
     """
-    if path.suffix not in (".png", ".svg"):
-        raise UserError(f"{path}: expected a file that ends in .png or .svg")
     module, _, function = study.picture.partition(":")
     draw: Callable[[Sequence[Row]], Picture] = getattr(import_module(module), function)
     with house_style():
         files = files_of(draw(rows))
-    write(path, files.png if path.suffix == ".png" else files.svg)
+    write(path, files.svg if path.suffix == ".svg" else files.png)
 
 
 def make(figure: Figure[Any], *, fast: bool, seed: int) -> Made:
