@@ -9,6 +9,9 @@ from typing import NamedTuple
 from hmcs.errors import UserError
 from hmcs.recognition.registry import DEFAULT
 from hmcs.task import load_task
+from hmcs_input_device.automatic import AUTO
+from hmcs_input_device.played import BUILT_IN
+from hmcs_input_device.sources import check_source
 from hmcs_local.compose import StackSpec
 from hmcs_local.own_task import PAGE, Arrangement, arranged, input_environment, own_task
 
@@ -62,6 +65,8 @@ def arrangement_of(
 
 
 def _check(wanted: Wanted) -> None:
+    if wanted.source is not None:
+        check_source(wanted.source, (*BUILT_IN, AUTO))
     if wanted.task is None:
         for option, value in (
             ("--model", wanted.model),

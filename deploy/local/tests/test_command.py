@@ -167,7 +167,7 @@ def test_up_on_a_taken_port_is_refused(
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["up", "--services", "nobody"], "no service 'nobody'"),
+        (["up", "--services", "nobody"], "unknown service 'nobody'"),
         (["up", "--scale", "a"], "--scale a: write SERVICE=N"),
         (["up", "--scale", "a=-1"], "--scale a=-1: write SERVICE=N"),
         (["up", "--scale", "router=2"], "--scale router=2"),

@@ -61,6 +61,40 @@ def test_training_refuses_what_cannot_be_before_it_reads_anything(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("train", "human-shape", "gone.csv", "--output", "m.hmcs"), "human-shapes"),
+        (("up", "human-shape"), "human-shapes"),
+        (("up", "human-shapes", "--source", "pge"), "page"),
+        (("up", "human-shapes", "d.csv", "--recognizer", "lhm"), "lhmm"),
+        (("up", "--services", "robt"), "robot"),
+        (("up", "--scale", "robt=2"), "robot"),
+        (("check", "gone.csv", "--task", "human-shape"), "human-shapes"),
+        (("task", "check", "human-shape"), "human-shapes"),
+        (("new", "mine", "--robot", "pandda"), "panda"),
+        (("robot", "check", "pandda"), "panda"),
+        (("recognizers", "lhm"), "lhmm"),
+        (("export", "gone", "--to", "made", "--format", "rosbag"), "rosbag2"),
+        (("study", "noice"), "noise"),
+        (("study", "noise", "--set", "trainig=1"), "training"),
+        (("figures", "--only", "4.1"), "4.1"),
+        (("tran",), "train"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else value,
+)
+def test_an_unknown_name_is_answered_with_the_nearest(
+    hmcs: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_csv(tmp_path / "d.csv", performed(1))
+    code, out, err = hmcs(*words)
+    assert (code, out) == (2, "")
+    assert "did you mean" in err.lower()
+    assert said in err.lower().partition("did you mean")[2]
+    assert "Traceback" not in err
+
+
 def test_a_file_where_the_folder_of_the_stack_should_be_is_named(hmcs: Run, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     code, _, err = hmcs("up", "--folder", tmp_path / "file")
