@@ -53,7 +53,7 @@ class LocalStack:
     their end first, within `__enter__`. `scale` overrides how many instances a service has,
     `environment` adds to the environment of a service, by service name; a variable that is None
     there is left out. `router` may end in `:0`:
-    a free port is chosen and `stack.router` tells it. Every volume of compose.yaml is a folder of
+    a free port is chosen and `stack.router` names it. Every volume of compose.yaml is a folder of
     `folder`, which also holds `logs/INSTANCE.log`. `variables` fill in `${NAME}` in compose.yaml
     and default to this process' environment; HMCS_* variables reach the services no other way.
     `open_to_network` lets the embedded router listen beyond this machine without TLS. `closed` is

@@ -104,7 +104,7 @@ def test_a_file_where_the_folder_of_the_stack_should_be_is_named(hmcs: Run, tmp_
 
 
 @pytest.mark.parametrize("words", [("--help",), ("check", "d.csv")])
-def test_a_full_disk_is_told_in_one_line(tmp_path: Path, words: tuple[str, ...]) -> None:
+def test_a_full_disk_is_reported_in_one_line(tmp_path: Path, words: tuple[str, ...]) -> None:
     write_csv(tmp_path / "d.csv", performed(1))
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

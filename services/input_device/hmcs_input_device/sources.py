@@ -63,8 +63,8 @@ def at_rest(sample: DeviceSample) -> DeviceSample:
 class Source(Protocol):
     """A device, or something that plays one.
 
-    It tells what it sees of the device and judges nothing: whether a press of the dead-man counts,
-    and what becomes of nonsense, is decided in one place for all (`guarded`).
+    It passes on what it sees of the device and judges nothing: whether a press of the dead-man
+    counts, and what becomes of nonsense, is decided in one place for all (`guarded`).
     """
 
     @property

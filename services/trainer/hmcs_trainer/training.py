@@ -47,7 +47,7 @@ def checked(
 
 
 def refuse(serious: Sequence[Finding]) -> None:
-    """Raise LearningError that tells all of these findings; nothing where there is none."""
+    """Raise LearningError with all of these findings; nothing where there is none."""
     if not serious:
         return
     hint = ". With --accept-implausible `hmcs train` learns from it all the same"

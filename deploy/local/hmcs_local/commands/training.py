@@ -85,7 +85,7 @@ def train(
 ) -> None:
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
-    The page tells how each demonstration is recognized by a model of the others, which states are
+    The page shows how each demonstration is recognized by a model of the others, which states are
     taken for each other, how far demonstrations lay apart, and what would help. States that are
     found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
