@@ -70,7 +70,7 @@ class LocalStack:
 
     def __init__(
         self,
-        compose: Path | None = None,
+        compose: Path | StackSpec | None = None,
         *,
         services: Sequence[str] | None = None,
         scale: Mapping[str, int] | None = None,
@@ -83,8 +83,10 @@ class LocalStack:
         while_waiting: Callable[[], None] = lambda: None,
         fetch: Callable[[str, Sequence[Path]], None] = lambda _router, _files: None,
     ) -> None:
-        path = compose or find_compose(Path.cwd())
-        self.spec: StackSpec = load_compose(path, os.environ if variables is None else variables)
+        if not isinstance(compose, StackSpec):
+            path = compose or find_compose(Path.cwd())
+            compose = load_compose(path, os.environ if variables is None else variables)
+        self.spec = compose
         self.router = with_free_port(router)
         self._closed = closed
         if closed is not None and not self.router.startswith("tls/"):

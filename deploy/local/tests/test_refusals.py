@@ -14,6 +14,7 @@ import pytest
 from hmcs.motion.demonstrations import write_csv
 from hmcs_local import entry
 from hmcs_local.command import main
+from hmcs_trainer import training
 from support.lessons import performed
 
 HMCS = [sys.executable, "-m", "hmcs_local.command"]
@@ -189,3 +190,15 @@ def test_the_version_and_completion_are_shown(hmcs: Run) -> None:
     done = subprocess.run(HMCS, capture_output=True, text=True, check=False, env=os.environ | asked)
     assert done.stdout.split() == ["segment"]
     assert "--install-completion" in hmcs("--help")[1]
+
+
+def test_what_is_asked_of_the_stack_is_checked_before_anything_is_learned(
+    hmcs: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(training, "train", lambda *_, **__: pytest.fail("it learned"))
+    write_csv(tmp_path / "d.csv", performed(1))
+    for words in (("--services", "nobody"), ("--scale", "nobody=2"), ("--source", "nobody")):
+        code, _, err = hmcs("up", "human-shapes", "d.csv", *words)
+        assert code == 2
+        assert "'nobody'" in err

@@ -78,7 +78,7 @@ def sound(learned: Callable[[], Model]) -> Model:
 
 
 def train(
-    task: str,
+    task: str | Task,
     references: Iterable[str],
     output: str | Path,
     *,
@@ -94,7 +94,7 @@ def train(
     progress: Callable[[str], None] = lambda _: None,
     fits: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Model:
-    """Learn a model of the task, a shipped one's name or a file, and write it to `output`.
+    """Learn a model of a task, also by a shipped one's name or a file, and write it to `output`.
 
     The model is called `name`, or as the task is. `recognizer` is the kind to learn for, with
     `settings` of its own as text; of `choices` the best by held-out likelihood is taken, `fits` is
@@ -114,7 +114,7 @@ def train(
     check_file_place(Path(output), "--output")
     if report is not None:
         check_file_place(Path(report), "the report")
-    loaded = load_task(task)
+    loaded = task if isinstance(task, Task) else load_task(task)
     progress("reading demonstrations")
     sources, noted = _read(loaded, references, choices_of_files, find_states=find_states)
     found, task_file = None, Path(output).with_suffix(".yaml")

@@ -108,6 +108,9 @@ def up(
     chosen = tuple(name.strip() for name in services.split(",") if name.strip())
     console = Console(highlight=False, soft_wrap=True)
     spec = load_compose(compose or find_compose(Path.cwd()), os.environ)
+    scales = dict(_scale(item) for item in scale or [])
+    for name in (*chosen, *scales):
+        spec.service(name)
     for name in unheard(os.environ, spec.variables | _OWN_VARIABLES):
         console.print(
             f"hmcs: {name} in the environment reaches no process: {spec.path} says what each is "
@@ -129,10 +132,10 @@ def up(
 
     code = run_up(
         lambda while_waiting: LocalStack(
-            compose,
+            spec,
             services=chosen or arrangement.services,
             environment=arrangement.environment,
-            scale=dict(_scale(item) for item in scale or []),
+            scale=scales,
             router=router,
             folder=folder,
             open_to_network=open_to_network,
