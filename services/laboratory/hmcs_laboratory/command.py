@@ -11,7 +11,7 @@ from rich.console import Console
 
 from hmcs.errors import UserError
 from hmcs.task.values import unknown_name_message
-from hmcs.write_places import check_file_place, check_folder_place
+from hmcs.write_places import check_file_place
 from hmcs_laboratory.report import as_json, as_table, progress_shown, studies_table
 from hmcs_laboratory.running import measure
 from hmcs_laboratory.studies import STUDIES
@@ -107,7 +107,6 @@ def run_figures(
     Says on standard output where their page is. Progress goes to standard error where it is a
     terminal. Ctrl-C ends with 130. Raises UserError as `make_figures` does.
     """
-    check_folder_place(folder, "--output")
     # Drawing takes a second to import, and studies do not need it.
     from hmcs_laboratory.figures.drawing import counted
     from hmcs_laboratory.figures.progress import figures_shown

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure as Picture
 from threadpoolctl import threadpool_limits
 
 from hmcs.errors import UserError
+from hmcs.write_places import check_folder_place
 from hmcs_laboratory.figures.catalog import find_figures
 from hmcs_laboratory.figures.drawing import Files, Number, files_of, house_style
 from hmcs_laboratory.figures.figure import Figure
@@ -68,10 +69,8 @@ def make_figures(
         if value is not None and value < least:
             raise UserError(f"--{name} {value}: expected {least} or more")
     figures = find_figures(numbers)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--output {folder}: cannot be made a folder: {error.strerror}") from error
+    check_folder_place(folder, "--output")
+    folder.mkdir(parents=True, exist_ok=True)
     made: dict[str, Made] = {}
     for each in _made(figures, fast, seed, workers):
         name = next(figure.name for figure in figures if figure.number == each.number)
