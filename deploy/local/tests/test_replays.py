@@ -149,7 +149,7 @@ def test_a_folder_that_is_a_file_is_reported(hmcs: Run, take: Path, tmp_path: Pa
     (tmp_path / "tables").write_text("mine")
     ended = hmcs("export", str(take), "--to", "tables")
     assert ended.returncode == 2
-    assert "tables: cannot be written to" in ended.stderr
+    assert "--to: tables: is no folder" in ended.stderr
     assert (tmp_path / "tables").read_text() == "mine"
 
 
