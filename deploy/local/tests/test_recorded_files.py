@@ -60,7 +60,7 @@ def test_other_commands_find_it_as_well(hmcs: Run, model: str, tmp_path: Path) -
         ("import", "take-2", "--to", "csv"),
         ("task", "check", "lines-through-obstacles", "take-2"),
         ("train", "lines-through-obstacles", "take-2", "--output", "n.hmcs"),
-        ("replay", "take-2", "--model", "gone.hmcs"),
+        ("replay", "take-2", "--model", model),
     ):
         assert said in hmcs(*words).stderr, words
     (file,) = (tmp_path / "csv").iterdir()
