@@ -89,7 +89,7 @@ class Shadows:
 
 
 def check_names_differ(newcomer: str, active: str) -> None:
-    """Raise SameNameError where two recognizers could not be told apart by their names."""
+    """Raise SameNameError where two recognizers could not be distinguished by their names."""
     if newcomer == active:
         raise SameNameError(
             f"it is called {newcomer!r}, as the active one is: train it under another name, so "

@@ -18,7 +18,7 @@ NS_PER_S = 1_000_000_000
 
 
 def step_of(message: messages.Step) -> Step:
-    """Return the step a message tells; their fields have the same names."""
+    """Return the step of a message; their fields have the same names."""
     return Step(**dict(message))
 
 
@@ -76,7 +76,7 @@ def guides_of(model: Model) -> Guides:
 def sample_of(motion: messages.Motion, seq: int, origin: messages.Origin | None) -> OperatorSample:
     """Return a Motion as the controller takes it; a device without rotation does not rotate.
 
-    `origin` is that of the Motion itself: it tells when the sample was taken.
+    `origin` is that of the Motion itself: it says when the sample was taken.
     """
     angular = np.zeros(3) if motion.angular_velocity is None else motion.angular_velocity
     return OperatorSample(

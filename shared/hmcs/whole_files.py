@@ -15,12 +15,18 @@ def written_whole(target: Path) -> Iterator[Path]:
     """Yield where to write what is to become `target`, beside it.
 
     It takes its place once the block has ended; where the block raises, nothing is left of it and
-    what `target` was before stays.
+    what `target` was before stays. An OSError names `target`.
     """
     unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         yield unfinished
         unfinished.replace(target)
+    except OSError as error:
+        # A full disk is reported without a name.
+        if error.filename in (None, str(unfinished)):
+            error.filename = str(target)
+            error.filename2 = None
+        raise
     finally:
         unfinished.unlink(missing_ok=True)
 

@@ -20,6 +20,13 @@ def check_file_place(target: Path, option: str) -> None:
     check_folder_place(target.parent, option)
 
 
+def check_new_folder_place(target: Path, option: str) -> None:
+    """Raise UserError where a folder is there already, or cannot be made."""
+    if os.path.lexists(target):
+        raise UserError(f"{option} {target}: is there already: name another folder")
+    check_folder_place(target.parent, option)
+
+
 def check_folder_place(folder: Path, option: str) -> None:
     """Raise UserError where nothing can be written into a folder, or it cannot be made.
 

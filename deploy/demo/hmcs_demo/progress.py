@@ -13,13 +13,13 @@ from rich.table import Table
 from rich.text import Text
 
 PROGRESS = "progress"
-"""The event that tells how far the run is; its facts are those of `Progress`."""
+"""The event that says how far the run is; its facts are those of `Progress`."""
 _PLAIN_EVERY_S = 5.0
 _BAR_WIDTH = 10
 
 
 class Progress(NamedTuple):
-    """How far a run is, as the observer tells it in its log."""
+    """How far a run is, as the observer logs it."""
 
     phase: str
     """`waiting`, `moving` or `finished`."""
@@ -36,7 +36,7 @@ class Progress(NamedTuple):
 
 
 class ProgressLine:
-    """Tells how far a run is. `say` tells an event for good, `show` how things stand now."""
+    """Shows how far a run is. `say` prints an event for good, `show` how things stand now."""
 
     def __init__(self, console: Console, motion_s: float) -> None:
         self._console = console

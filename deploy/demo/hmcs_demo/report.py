@@ -1,4 +1,4 @@
-"""The report: a page that tells what happened, with pictures and figures, and files behind it."""
+"""The report: a page on what happened, with pictures and figures, and files behind it."""
 
 from __future__ import annotations
 

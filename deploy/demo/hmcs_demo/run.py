@@ -19,6 +19,7 @@ from hmcs.motion.demonstrations import read_csv
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.task import Task, load_task
+from hmcs.write_places import check_folder_place
 from hmcs_demo.measure import measure
 from hmcs_demo.play import RATE_HZ, Plan, Played, play
 from hmcs_demo.progress import ProgressLine
@@ -47,6 +48,7 @@ def run(*, output: Path, seed: int, held_out: tuple[int, ...]) -> int:
     folder cannot be written.
     """
     _check(held_out)
+    check_folder_place(output, "--output")
     failed = output.with_name(f"{output.name}-failed")
     console = Console(highlight=False, soft_wrap=True)
     try:

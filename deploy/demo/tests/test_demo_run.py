@@ -51,7 +51,7 @@ def test_mistake_on_the_command_line_is_exit_code_2(
 
 def test_folder_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    with pytest.raises(UserError, match="cannot be written"):
+    with pytest.raises(UserError, match="is no folder"):
         demo.run(output=tmp_path / "file" / "report", seed=1, held_out=(1, 5))
 
 

@@ -8,7 +8,10 @@ from typing import NamedTuple
 
 from hmcs.errors import UserError
 from hmcs.recognition.registry import DEFAULT
-from hmcs.task import load_task
+from hmcs.task import Task, load_task
+from hmcs_input_device.automatic import AUTO
+from hmcs_input_device.played import BUILT_IN
+from hmcs_input_device.sources import check_source
 from hmcs_local.compose import StackSpec
 from hmcs_local.own_task import PAGE, Arrangement, arranged, input_environment, own_task
 
@@ -50,10 +53,12 @@ def arrangement_of(
         source = wanted.source
         changed = {} if source is None else {_INPUT: _demo_input(source, models)}
         return Arrangement(spec.usual, changed)
+    task = load_task(wanted.task)
     models.mkdir(parents=True, exist_ok=True)
-    model = wanted.model or _learned(wanted, models, progress)
+    model = wanted.model or _learned(wanted, task, models, progress)
     own = own_task(
         wanted.task,
+        task,
         model=model,
         source=wanted.source or PAGE,
         demonstrations=wanted.demonstrations,
@@ -62,6 +67,8 @@ def arrangement_of(
 
 
 def _check(wanted: Wanted) -> None:
+    if wanted.source is not None:
+        check_source(wanted.source, (*BUILT_IN, AUTO))
     if wanted.task is None:
         for option, value in (
             ("--model", wanted.model),
@@ -78,16 +85,17 @@ def _check(wanted: Wanted) -> None:
         )
 
 
-def _learned(wanted: Wanted, models: Path, progress: Callable[[str], None]) -> Path | None:
+def _learned(
+    wanted: Wanted, task: Task, models: Path, progress: Callable[[str], None]
+) -> Path | None:
     if not wanted.demonstrations:
         return None
     # It brings scikit-learn along, which nobody needs who learns nothing.
     from hmcs_trainer.training import train
 
-    assert wanted.task is not None
-    output = models / f"{load_task(wanted.task).name}.hmcs"
+    output = models / f"{task.name}.hmcs"
     train(
-        wanted.task,
+        task,
         list(wanted.demonstrations),
         output,
         recognizer=wanted.recognizer or DEFAULT,

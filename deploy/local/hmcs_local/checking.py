@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from rich.console import Console
@@ -20,7 +20,7 @@ _LONGEST = 4000
 
 
 def show_check(
-    references: Sequence[str], task: str, console: Console, choices: Choices = AS_IT_IS
+    references: Iterable[str], task: str, console: Console, choices: Choices = AS_IT_IS
 ) -> bool:
     """Show what is known of each demonstration; return whether none would be refused."""
     loaded = load_task(task) if task else None

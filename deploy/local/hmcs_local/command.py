@@ -93,7 +93,7 @@ def common(
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """HMCS: recognizes what an operator's hand is about to do, and lends it a ruler."""
+    """HMCS: recognizes what an operator's hand is about to do, and guides it along its path."""
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import yaml
 
 from hmcs.errors import UserError
+from hmcs.task.values import unknown_name_message
 
 COMPOSE = "compose.yaml"
 ROUTER = "router"
@@ -77,9 +78,8 @@ class StackSpec:
         try:
             return self.services[name]
         except KeyError:
-            raise ComposeError(
-                f"no service {name!r} in {self.path}: choose from {', '.join(self.services)}"
-            ) from None
+            unknown = unknown_name_message("service", name, self.services)
+            raise ComposeError(f"{self.path}: {unknown}") from None
 
 
 def find_compose(start: Path) -> Path:

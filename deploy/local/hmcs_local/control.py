@@ -148,6 +148,11 @@ class Control:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
+    def check_there(self) -> None:
+        """Raise ControlError where no `hmcs up` works in the folder."""
+        if not _is_answered(control_path(self._folder)):
+            raise self._nobody()
+
     def start(self, service: str, command: Sequence[str] | None = None) -> str:
         """Start one more instance of a service; returns its name."""
         request = {"start": service, "command": list(command) if command else None}
@@ -175,13 +180,16 @@ class Control:
                 connection.sendall(_as_line(request))
                 answer = json.loads(_line_from(connection, _ANSWER_TIMEOUT_S))
             except (OSError, ValueError):
-                raise ControlError(
-                    f"no `hmcs up` works in {self._folder.resolve()}: start one, or name the "
-                    "folder of the one that runs with --folder"
-                ) from None
+                raise self._nobody() from None
         if "error" in answer:
             raise ControlError(answer["error"])
         return dict(answer)
+
+    def _nobody(self) -> ControlError:
+        return ControlError(
+            f"no `hmcs up` works in {self._folder.resolve()}: start one, or name the folder of the "
+            "one that runs with --folder"
+        )
 
 
 def _as_line(message: dict[str, Any]) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from hmcs.errors import UserError
@@ -22,7 +22,7 @@ _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]")
 
 
 def import_as_csv(
-    references: Sequence[str], to: Path, choices: Choices, progress: Callable[[str], None]
+    references: Iterable[str], to: Path, choices: Choices, progress: Callable[[str], None]
 ) -> Iterator[str]:
     """Write each demonstration as a CSV file; yield what was taken for what.
 
@@ -36,6 +36,7 @@ def import_as_csv(
         _check_free(to)
     else:
         check_folder_place(to, "--to")
+    references = list(references)
     for reference in references:
         if is_drawing(reference):
             raise UserError(f"{reference}: is a drawing, which `hmcs train` reads as it is")

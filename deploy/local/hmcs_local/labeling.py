@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from hmcs.errors import UserError
@@ -29,6 +28,7 @@ from hmcs.recordings.stretches import (
 from hmcs.shown import plain
 from hmcs.task import Task
 from hmcs.task.values import unknown_name_message
+from hmcs_local.tables import show_table
 
 _SET = re.compile(
     r"\s*(?P<begin>\d+(?:\.\d*)?|\.\d+)\s*[-–]\s*(?P<end>\d+(?:\.\d*)?|\.\d+)\s*=(?P<state>.*)"
@@ -97,13 +97,9 @@ def _show(content: RecordingContent, labels: Sequence[Stretch], console: Console
     if not labels:
         console.print(Text(f"{title}, no labels: set one by --set BEGIN-END=STATE"))
         return
-    table = Table(title=Text(title), title_justify="left")
-    table.add_column("from, s", justify="right")
-    table.add_column("to, s", justify="right")
-    table.add_column("state")
-    table.add_column("how")
     how = how_labeled(content)
+    rows = []
     for label in labels:
         begin_s, end_s = ((at - content.first_ns) / NS_PER_S for at in label[:2])
-        table.add_row(f"{begin_s:.3f}", f"{end_s:.3f}", Text(plain(label.state)), how)
-    console.print(table)
+        rows.append((f"{begin_s:.3f}", f"{end_s:.3f}", label.state, how))
+    show_table(console, title, ("from, s", "to, s", "state", "how"), rows, ("from, s", "to, s"))

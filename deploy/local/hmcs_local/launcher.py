@@ -1,4 +1,4 @@
-"""`hmcs up`: keeps a stack running and tells what happens in it, until it is stopped."""
+"""`hmcs up`: keeps a stack running and reports what happens in it, until it is stopped."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MOST_DOUBLINGS = 16
 
 
 class Launcher:
-    """Looks after a stack: passes its logs on, tells unexpected ends, restarts as compose would.
+    """Looks after a stack: passes its logs on, reports unexpected ends, restarts as compose would.
 
     `say` gets one line at a time: who speaks (an instance, or `hmcs`) and what. Whatever goes wrong
     with one process, or with saying it, the others are looked after.

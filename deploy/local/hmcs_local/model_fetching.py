@@ -17,7 +17,7 @@ ANSWER_WITHIN_S = 10.0
 
 
 def fetch_models(bus: Bus, files: Iterable[Path]) -> list[str]:
-    """Write each model file, named as its model, from whoever has that model loaded.
+    """Write each model file, named as its model, from a process that has that model loaded.
 
     Returns a line for each. Raises UserError where nobody has a model, what came is none, or it
     cannot be written. Signatures do not come along.

@@ -11,6 +11,7 @@ from hmcs.errors import UserError
 from hmcs.task import check_task
 from hmcs.task.values import unknown_name_message
 from hmcs.whole_files import written_whole
+from hmcs.write_places import check_file_place
 
 Plane = Literal["xy", "xz", "yz"]
 PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
@@ -41,6 +42,7 @@ def write_new_task(
     Raises UserError for a file that is there already (unless `force`), an unknown robot, and names
     that no task can have.
     """
+    check_file_place(file, "NAME")
     if file.exists() and not force:
         raise UserError(f"{file}: is there already: choose another name, or --force to replace it")
     if robot not in PLACES:

@@ -16,7 +16,7 @@ from hmcs.errors import UserError
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.registry import DEFAULT
-from hmcs.task import Task, load_task, shipped_tasks
+from hmcs.task import Task, shipped_tasks
 from hmcs_local.compose import StackSpec
 from hmcs_local.stack import LAYERED
 
@@ -52,22 +52,21 @@ class Arrangement(NamedTuple):
 
 
 def own_task(
-    task: str, *, model: Path | None, source: str, demonstrations: Sequence[str]
+    name: str, task: Task, *, model: Path | None, source: str, demonstrations: Sequence[str]
 ) -> OwnTask:
-    """Return the task to bring the stack up for.
+    """Return the task to bring the stack up for; `name` is a shipped one's, or its file.
 
-    Raises TaskFileError for a task that cannot be read, ModelFileError for a model, and UserError
-    for a model of another task and a source that has nothing to play.
+    Raises ModelFileError for a model that cannot be read, and UserError for one of another task and
+    a source that has nothing to play.
     """
-    known = load_task(task)
-    place = task if task in shipped_tasks() else str(Path(task).resolve())
+    place = name if name in shipped_tasks() else str(Path(name).resolve())
     played = next((Path(each) for each in demonstrations if each.endswith(".csv")), None)
     if source == RECORDED and played is None:
         raise UserError(f"--source {RECORDED}: give the CSV file to play as a demonstration")
     layered = False
     if model is not None:
         read = load_model(model)
-        _check_is_of(read, model, known)
+        _check_is_of(read, model, task)
         layered = read.recognizer == DEFAULT
     return OwnTask(place, model, layered, source, played)
 

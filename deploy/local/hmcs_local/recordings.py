@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from hmcs.errors import UserError
 from hmcs.recordings.demonstrations import demonstrations_of
@@ -21,9 +19,11 @@ from hmcs.recordings.json_codec import readable_as
 from hmcs.recordings.labels import label_notes, labels_of
 from hmcs.recordings.reading import RecordingContent, read
 from hmcs.shown import plain
+from hmcs_local.tables import show_table
 
 LONGEST_LINE = 4000
 """Characters of a line; the settings of no process take as many."""
+_NUMBERS = ("messages", "Hz", "lost", "longest gap, s")
 
 
 def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
@@ -35,20 +35,19 @@ def show_inspection(file: Path, console: Console, *, as_json: bool) -> bool:
         line = json.dumps(_told(content, inspection, problems))
         console.print(line, soft_wrap=True, highlight=False, markup=False)
         return not problems
-    title = Text(f"{plain(file.name)}: {inspection.duration_s:.1f} s")
-    table = Table(title=title, title_justify="left")
-    for name in ("key", "message", "messages", "Hz", "lost", "longest gap, s"):
-        table.add_column(name, justify="left" if name in ("key", "message") else "right")
-    for channel in inspection.channels:
-        table.add_row(
-            Text(plain("/".join(channel.key.split("/")[3:]))),
-            Text(plain(channel.schema)),
+    rows = [
+        (
+            "/".join(channel.key.split("/")[3:]),
+            channel.schema,
             str(channel.messages),
             f"{channel.rate_hz:.1f}",
             str(channel.lost),
             f"{channel.longest_gap_s:.3f}",
         )
-    console.print(table)
+        for channel in inspection.channels
+    ]
+    title = f"{file.name}: {inspection.duration_s:.1f} s"
+    show_table(console, title, ("key", "message", *_NUMBERS), rows, _NUMBERS)
     for name, facts in sorted(content.metadata.items()):
         shown = {key: value for key, value in facts.items() if key != "settings" and value}
         _say(console, f"{name}: " + ", ".join(f"{key} {value}" for key, value in shown.items()))

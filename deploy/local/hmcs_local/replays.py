@@ -8,17 +8,15 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-from rich.table import Table
-from rich.text import Text
 
 from hmcs.errors import UserError
-from hmcs.recognition.model_file import load_model
+from hmcs.recognition.model import Model
 from hmcs.recordings.comparing import (
     Comparison,
     FixtureComparison,
@@ -31,14 +29,21 @@ from hmcs.recordings.labels import labels_of
 from hmcs.recordings.reading import read
 from hmcs.recordings.replaying import Replay, kept_model, replayed
 from hmcs.shown import plain
+from hmcs.task import load_task
 from hmcs.whole_files import written_whole
+from hmcs.write_places import check_file_place
+from hmcs_local import guard
 from hmcs_local.connecting import Reached
+from hmcs_local.interrupts import interruptible
+from hmcs_local.tables import show_table
 
 DRAWN_AS = (".png", ".svg")
 OPEN_LOOP = (
     "an open loop: hand and robot are where they were recorded, the hand did not react to "
     "what the fixture would have done"
 )
+_END_WITHIN_S = 5.0
+"""So long a live replay has to say goodbye when it is interrupted."""
 
 
 class Files(NamedTuple):
@@ -50,23 +55,28 @@ class Files(NamedTuple):
     """PNG or SVG."""
 
 
+def check_files(files: Files) -> None:
+    """Raise UserError for a file that cannot be written, or a picture of no known kind."""
+    if files.picture is not None and files.picture.suffix.lower() not in DRAWN_AS:
+        raise UserError(f"--picture {files.picture}: expected a name that ends in .png or .svg")
+    for target, option in ((files.steps, "--out"), (files.picture, "--picture")):
+        if target is not None:
+            check_file_place(target, option)
+            if not target.parent.is_dir():
+                raise UserError(f"{option} {target}: there is no folder {target.parent}: make it")
+
+
 def replay_in_process(
-    file: Path, model: Path | None, files: Files, console: Console, *, as_json: bool
+    file: Path, model: Model | None, files: Files, console: Console, *, as_json: bool
 ) -> None:
     """Replay a recording, show how it stands to what was recorded, and write `files`.
 
-    Raises a UserError for a recording or model that cannot be used, or do not fit each other, and
-    for a file that cannot be written; none of the files is written then.
+    Without a model the one that is kept with the recording replays it. Raises a UserError for a
+    recording or model that cannot be used, or do not fit each other, and for a file that cannot be
+    written; none of the files is written then.
     """
-    if files.picture is not None and files.picture.suffix.lower() not in DRAWN_AS:
-        raise UserError(f"--picture {files.picture}: expected a name that ends in .png or .svg")
-    for target in files:
-        if target is not None and target.is_dir():
-            raise UserError(f"{target}: is a folder: name a file in it")
-        if target is not None and not target.parent.is_dir():
-            raise UserError(f"{target}: there is no folder {target.parent}: make it first")
     content = read(file)
-    chosen = kept_model(content) if model is None else load_model(model)
+    chosen = kept_model(content) if model is None else model
     with Progress(
         TextColumn("replaying"), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True)
     ) as progress:
@@ -101,7 +111,7 @@ def replay_in_process(
         figures = {name: None if value != value else value for name, value in figures.items()}
         console.print(json.dumps(figures), soft_wrap=True, highlight=False, markup=False)
     else:
-        console.print(_side_by_side(file.name, replay, beliefs, fixtures))
+        _show_side_by_side(console, file.name, replay, beliefs, fixtures)
         for note in [*([OPEN_LOOP] if fixture.ticks else []), *notes]:
             console.print(f"note: {plain(note)}", highlight=False, markup=False)
 
@@ -116,36 +126,52 @@ def _degraded(beliefs: Comparison) -> Iterator[str]:
 
 
 def replay_live(file: Path, rate: float, task: str, to: Reached) -> int:
-    """Be the input device of a cell that plays a recording; return its exit code."""
+    """Be the input device of a cell that plays a recording, to its end; return the exit code.
+
+    Ctrl-C ends it before, with the dead-man released.
+    """
     read(file)
+    load_task(task)
     command = [sys.executable, "-m", "hmcs_input_device", "--source", "recording"]
     command += ["--demonstration", str(file), "--speed", str(rate), "--task", task]
-    command += ["--router", to.router, "--cell", to.cell]
+    command += ["--router", to.router, "--cell", to.cell, "--exit-when-played"]
     tls = {f"HMCS_{name.upper()}": str(file) for name, file in to.tls.items()}
-    try:
-        return subprocess.run(command, env=os.environ | tls, check=False).returncode
-    except KeyboardInterrupt:
-        return 0
+    bound = [sys.executable, "-S", "-E", guard.__file__, str(os.getpid()), *command]
+    with interruptible():
+        # In a session of its own, so that it is ended by this process and not by the terminal.
+        device = subprocess.Popen(bound, env=os.environ | tls, start_new_session=True)
+        try:
+            return device.wait()
+        except KeyboardInterrupt:
+            device.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                device.wait(_END_WITHIN_S)
+            return 0
+        finally:
+            device.kill()
+            device.wait()
 
 
-def _side_by_side(
-    title: str, replay: Replay, beliefs: Comparison, fixtures: FixtureComparison
-) -> Table:
+def _show_side_by_side(
+    console: Console,
+    title: str,
+    replay: Replay,
+    beliefs: Comparison,
+    fixtures: FixtureComparison,
+) -> None:
     """What was and what is, a line a figure; no line for what there is nothing of."""
     heading = (
         f"{title}: {beliefs.steps} steps in {replay.lasted_s:.1f} s; recorded "
         f"{replay.compared_with or 'nobody'}, replayed {replay.model.name}, "
         f"{beliefs.times_real:.0f} times as fast"
     )
-    table = Table(title=Text(plain(heading)), title_justify="left")
-    table.add_column("", no_wrap=True)
-    for name in ("recorded", "replayed", "side by side"):
-        table.add_column(name, justify="right", no_wrap=True)
+    rows = []
     for name, *cells in (*_belief_rows(beliefs), *_fixture_rows(fixtures)):
         shown = ["" if "nan" in cell else cell for cell in cells]
         if any(shown):
-            table.add_row(name, *shown)
-    return table
+            rows.append((name, *shown))
+    columns = ("recorded", "replayed", "side by side")
+    show_table(console, heading, ("", *columns), rows, columns)
 
 
 def _belief_rows(beliefs: Comparison) -> Iterator[tuple[str, str, str, str]]:

@@ -9,6 +9,8 @@ from rich.console import Console
 from hmcs.errors import UserError
 from hmcs.shown import plain
 from hmcs.task import Task, load_task
+from hmcs.task.values import unknown_name_message
+from hmcs.write_places import check_file_place
 from hmcs_local.tables import show_table
 from hmcs_robot.description.checking import joint_rows, reach_of, tool_at
 from hmcs_robot.description.described import (
@@ -41,8 +43,13 @@ def check_robot(
     """
     if output is not None and output.suffix.lower() not in _PICTURES:
         raise UserError(f"--output {output}: expected a name that ends in {', '.join(_PICTURES)}")
-    if output is not None and not output.parent.is_dir():
-        raise UserError(f"--output {output}: there is no folder {output.parent}: make it first")
+    if output is not None:
+        check_file_place(output, "--output")
+        if not output.parent.is_dir():
+            raise UserError(f"--output {output}: there is no folder {output.parent}: make it first")
+    for folder in package_path:
+        if not folder.is_dir():
+            raise UserError(f"--package-path {folder}: no such folder")
     model = _model(file)
     model = model._replace(
         tool_link=tool_link or model.tool_link,
@@ -116,6 +123,8 @@ def _model(file: str) -> RobotModel:
         return ROBOTS[file]
     if Path(file).suffix.lower() in _TASK_FILES:
         return model_of(load_task(file).robot)
+    if not Path(file).exists() and not Path(file).suffix:
+        raise UserError(f"{unknown_name_message('robot', file, ROBOTS)}, or name a URDF file")
     return RobotModel(Path(file), None, package_path=ros_package_path())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
 from hmcs.recordings.generated_marker import is_unchanged_generated
 from hmcs.recordings.labels import labels_beside, write_labels
 from hmcs.shown import plain
-from hmcs.write_places import check_file_place
+from hmcs.write_places import check_file_place, check_folder_place
 from hmcs_local.tables import show_table
 from hmcs_trainer.references import Source, is_drawing, read_sources
 
@@ -43,7 +43,7 @@ class Segmented(NamedTuple):
 
 
 def segment_files(
-    references: Sequence[str],
+    references: Iterable[str],
     model_file: Path,
     *,
     out: Path | None,
@@ -58,6 +58,9 @@ def segment_files(
     """
     model = load_model(model_file)
     segmentation_of(model, ())
+    if out is not None:
+        check_folder_place(out.parent, "--out")
+    references = list(references)
     targets = [None] * len(references) if out is None else _targets(references, out)
     for reference, target in zip(references, targets, strict=True):
         (source,) = read_sources([reference], model.task, labels_count=False, choices=choices)

@@ -53,7 +53,7 @@ class LocalStack:
     their end first, within `__enter__`. `scale` overrides how many instances a service has,
     `environment` adds to the environment of a service, by service name; a variable that is None
     there is left out. `router` may end in `:0`:
-    a free port is chosen and `stack.router` tells it. Every volume of compose.yaml is a folder of
+    a free port is chosen and `stack.router` names it. Every volume of compose.yaml is a folder of
     `folder`, which also holds `logs/INSTANCE.log`. `variables` fill in `${NAME}` in compose.yaml
     and default to this process' environment; HMCS_* variables reach the services no other way.
     `open_to_network` lets the embedded router listen beyond this machine without TLS. `closed` is
@@ -70,7 +70,7 @@ class LocalStack:
 
     def __init__(
         self,
-        compose: Path | None = None,
+        compose: Path | StackSpec | None = None,
         *,
         services: Sequence[str] | None = None,
         scale: Mapping[str, int] | None = None,
@@ -83,8 +83,10 @@ class LocalStack:
         while_waiting: Callable[[], None] = lambda: None,
         fetch: Callable[[str, Sequence[Path]], None] = lambda _router, _files: None,
     ) -> None:
-        path = compose or find_compose(Path.cwd())
-        self.spec: StackSpec = load_compose(path, os.environ if variables is None else variables)
+        if not isinstance(compose, StackSpec):
+            path = compose or find_compose(Path.cwd())
+            compose = load_compose(path, os.environ if variables is None else variables)
+        self.spec = compose
         self.router = with_free_port(router)
         self._closed = closed
         if closed is not None and not self.router.startswith("tls/"):

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from rich.console import Console, Group
 from rich.live import Live
-from rich.table import Table
 from rich.text import Text
 
 from hmcs import process_words
@@ -19,10 +18,12 @@ from hmcs.process_words import ILL, LATE, LOST, NOBODY, OK, REFUSED, process_nam
 from hmcs.shown import plain
 from hmcs_local.asking import left_out
 from hmcs_local.observer import Observation, Sighting, observe
+from hmcs_local.tables import Cell, table_of
 
 _LOOK_EVERY_S = 1.0
 _WIDTH_FOR_DETAILS = 110
 """Columns of a terminal; on a narrower one only those who are ill get a line of their own."""
+_NUMBERS = ("in/s", "out/s", LOST, REFUSED, LATE, "cpu %", "up s")
 _NOTHING = Health(
     healthy=True,
     detail="",
@@ -109,7 +110,7 @@ def show_status(bus: Bus, console: Console, *, once: bool) -> bool:
     before, now = None, observe(bus)
     if once or not console.is_terminal:
         before, now = now, _look_again(bus, _LOOK_EVERY_S / 2)
-        console.print(_picture(bus, now, before, console.width))
+        console.print(_picture(bus, now, before, console.width), soft_wrap=False)
         well = all(s.health and s.health.healthy for s in now.sightings)
         return bool(now.sightings) and well and not remarks(now, before)
     with Live(_picture(bus, now, None, console.width), console=console, auto_refresh=False) as live:
@@ -155,28 +156,26 @@ def _picture(bus: Bus, now: Observation, before: Observation | None, width: int)
     strangers = [Text(line, "yellow") for line in [left_out(now.strangers)] if line]
     if not sightings:
         return Group(where, Text(NOBODY, style="yellow"), *strangers)
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("process", no_wrap=True)
-    table.add_column("")
-    for name in ("in/s", "out/s", LOST, REFUSED, LATE, "cpu %", "up s"):
-        table.add_column(name, justify="right", no_wrap=True)
-    if width >= _WIDTH_FOR_DETAILS:
-        table.add_column("detail")
+    details = width >= _WIDTH_FOR_DETAILS
+    columns = ("process", "", *_NUMBERS, *(("detail",) if details else ()))
     earlier = {(s.member, s.boot): s for s in before.sightings} if before else {}
     lines = [row(s, earlier.get((s.member, s.boot))) for s in sightings]
-    for line in lines:
-        table.add_row(
-            Text(line.process),
+    rows: list[tuple[Cell, ...]] = [
+        (
+            line.process,
             Text(OK, style="green") if line.healthy else Text(ILL, style="red"),
             f"{line.received_hz:.0f}",
             f"{line.sent_hz:.0f}",
             *(_count(count) for count in (line.lost, line.refused, line.late)),
             f"{line.cpu_percent:.0f}",
             f"{line.uptime_s:.0f}",
-            *([Text(line.detail)] if width >= _WIDTH_FOR_DETAILS else []),
+            *([line.detail] if details else []),
         )
+        for line in lines
+    ]
+    table = table_of("", columns, rows, _NUMBERS, width=width, drawn=False)
     ill = [f"{line.process}: {line.detail}" for line in lines if not line.healthy]
-    wrong = [*(ill if width < _WIDTH_FOR_DETAILS else []), *remarks(now, before)]
+    wrong = [*([] if details else ill), *remarks(now, before)]
     return Group(where, table, *(Text(line, "red") for line in wrong), *strangers)
 
 

@@ -52,7 +52,7 @@ def test_what_cannot_be_done_is_answered_and_the_server_goes_on(
     control = Control(stack.folder)
 
     def command() -> None:
-        with pytest.raises(ControlError, match="no service 'nobody'"):
+        with pytest.raises(ControlError, match="unknown service 'nobody'"):
             control.start("nobody")
         with pytest.raises(ControlError, match="'nobody' was not started here"):
             control.stop("nobody")

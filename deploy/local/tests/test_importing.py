@@ -24,7 +24,9 @@ def hmcs(*words: str | Path) -> subprocess.CompletedProcess[str]:
 
 def imported(sources: list[str], to: Path) -> tuple[list[str], list[str]]:
     files = list[str]()
-    notes = list(import_as_csv(expanded(sources), to, choices_of(), files.append))
+    notes = list(
+        import_as_csv(expanded(sources, Path("out/up"), print), to, choices_of(), files.append)
+    )
     return notes, files
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -41,13 +42,15 @@ def states(take: Path) -> list[str]:
 
 def rows(out: str) -> list[list[str]]:
     """The cells of a table that was printed."""
-    return [line.strip("│ ").split("│") for line in out.splitlines() if line.startswith("│")]
+    lines = [re.split(r"  +", line.strip()) for line in out.splitlines()]
+    head = next(number for number, cells in enumerate(lines) if "state" in cells)
+    return [cells for cells in lines[head + 1 :] if len(cells) == len(lines[head])]
 
 
 def test_labels_are_shown_with_how_they_were_set(hmcs: Run, take: Path) -> None:
     code, out, _ = hmcs("label", take)
     assert code == 0
-    found = [[cell.strip() for cell in row] for row in rows(out)]
+    found = rows(out)
     assert [row[2:] for row in found] == [
         ["lift", "said meanwhile"],
         ["carry", "said meanwhile"],
@@ -147,7 +150,7 @@ def test_labels_of_another_recording_are_reported_and_kept_aside(hmcs: Run, take
     code, out, _ = hmcs("label", take)
     assert code == 0
     assert "note: the labels in take.labels.csv are of another recording" in out
-    assert [row[2].strip() for row in rows(out)] == ["carry", "lift"]
+    assert [row[2] for row in rows(out)] == ["carry", "lift"]
     assert "take.labels.csv are of another recording" in hmcs("inspect", take)[1]
     code, out, _ = hmcs("label", take, "--set", "0-1=lift")
     assert code == 0

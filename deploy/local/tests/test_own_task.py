@@ -8,6 +8,7 @@ import pytest
 from hmcs.errors import UserError
 from hmcs.recognition.learning import learn
 from hmcs.recognition.model_file import save_model
+from hmcs.task import load_task
 from hmcs_local.bringing_up import Wanted, arrangement_of
 from hmcs_local.compose import load_compose, own_compose
 from hmcs_local.own_task import PAGE, arranged, input_environment, own_task, unheard
@@ -36,7 +37,7 @@ def model_of(kind: str, folder: Path) -> Path:
 def test_without_a_model_nothing_of_the_demo_runs_and_the_page_moves_the_hand(
     task: Path, tmp_path: Path
 ) -> None:
-    own = own_task(str(task), model=None, source=PAGE, demonstrations=())
+    own = own_task(str(task), load_task(task), model=None, source=PAGE, demonstrations=())
     services, environment = arranged(own, SPEC, tmp_path / "models", tmp_path / "recordings")
     assert set(services) == set(SERVICES) - DEMO_ALONE
     assert environment["input-device"]["HMCS_SOURCE"] == "page"
@@ -56,7 +57,7 @@ def test_a_model_is_run_by_the_processes_of_its_kind(
     task: Path, tmp_path: Path, kind: str, runs: str, waits: str
 ) -> None:
     file = model_of(kind, tmp_path)
-    own = own_task(str(task), model=file, source=PAGE, demonstrations=())
+    own = own_task(str(task), load_task(task), model=file, source=PAGE, demonstrations=())
     services, environment = arranged(own, SPEC, tmp_path / "models", tmp_path / "recordings")
     assert environment[runs]["HMCS_MODEL"] == str(file)
     assert runs in services
@@ -67,9 +68,9 @@ def test_a_model_is_run_by_the_processes_of_its_kind(
 
 
 def test_a_model_of_another_task_is_refused(tmp_path: Path) -> None:
-    file = model_of("task-hmm", tmp_path)
+    file, other = model_of("task-hmm", tmp_path), DATA / "reach-and-lift.yaml"
     with pytest.raises(UserError, match=r"it is of the task 'lesson', not of 'reach-and-lift'"):
-        own_task(str(DATA / "reach-and-lift.yaml"), model=file, source=PAGE, demonstrations=())
+        own_task(str(other), load_task(other), model=file, source=PAGE, demonstrations=())
 
 
 @pytest.mark.parametrize("source", ["synthetic", "simulated"])
@@ -81,8 +82,16 @@ def test_an_operator_who_follows_learned_paths_needs_a_model(source: str) -> Non
 
 def test_what_is_recorded_is_played_from_a_demonstration(task: Path) -> None:
     with pytest.raises(UserError, match="--source recorded: give the CSV file to play"):
-        own_task(str(task), model=None, source="recorded", demonstrations=("take.mcap",))
-    own = own_task(str(task), model=None, source="recorded", demonstrations=("a.mcap", "b.csv"))
+        own_task(
+            str(task), load_task(task), model=None, source="recorded", demonstrations=("take.mcap",)
+        )
+    own = own_task(
+        str(task),
+        load_task(task),
+        model=None,
+        source="recorded",
+        demonstrations=("a.mcap", "b.csv"),
+    )
     assert own.demonstration == Path("b.csv")
 
 

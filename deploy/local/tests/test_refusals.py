@@ -14,6 +14,7 @@ import pytest
 from hmcs.motion.demonstrations import write_csv
 from hmcs_local import entry
 from hmcs_local.command import main
+from hmcs_trainer import training
 from support.lessons import performed
 
 HMCS = [sys.executable, "-m", "hmcs_local.command"]
@@ -61,6 +62,40 @@ def test_training_refuses_what_cannot_be_before_it_reads_anything(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("train", "human-shape", "gone.csv", "--output", "m.hmcs"), "human-shapes"),
+        (("up", "human-shape"), "human-shapes"),
+        (("up", "human-shapes", "--source", "pge"), "page"),
+        (("up", "human-shapes", "d.csv", "--recognizer", "lhm"), "lhmm"),
+        (("up", "--services", "robt"), "robot"),
+        (("up", "--scale", "robt=2"), "robot"),
+        (("check", "gone.csv", "--task", "human-shape"), "human-shapes"),
+        (("task", "check", "human-shape"), "human-shapes"),
+        (("new", "mine", "--robot", "pandda"), "panda"),
+        (("robot", "check", "pandda"), "panda"),
+        (("recognizers", "lhm"), "lhmm"),
+        (("export", "gone", "--to", "made", "--format", "rosbag"), "rosbag2"),
+        (("study", "noice"), "noise"),
+        (("study", "noise", "--set", "trainig=1"), "training"),
+        (("figures", "--only", "4.1"), "4.1"),
+        (("tran",), "train"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else value,
+)
+def test_an_unknown_name_is_answered_with_the_nearest(
+    hmcs: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_csv(tmp_path / "d.csv", performed(1))
+    code, out, err = hmcs(*words)
+    assert (code, out) == (2, "")
+    assert "did you mean" in err.lower()
+    assert said in err.lower().partition("did you mean")[2]
+    assert "Traceback" not in err
+
+
 def test_a_file_where_the_folder_of_the_stack_should_be_is_named(hmcs: Run, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     code, _, err = hmcs("up", "--folder", tmp_path / "file")
@@ -70,7 +105,7 @@ def test_a_file_where_the_folder_of_the_stack_should_be_is_named(hmcs: Run, tmp_
 
 
 @pytest.mark.parametrize("words", [("--help",), ("check", "d.csv")])
-def test_a_full_disk_is_told_in_one_line(tmp_path: Path, words: tuple[str, ...]) -> None:
+def test_a_full_disk_is_reported_in_one_line(tmp_path: Path, words: tuple[str, ...]) -> None:
     write_csv(tmp_path / "d.csv", performed(1))
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -120,6 +155,27 @@ def test_an_interrupt_while_the_command_is_loaded_ends_it_without_a_word(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("module", ["typer", "rich.text", "pydantic", "numpy", "hmcs_trainer"])
+def test_an_interrupt_at_any_import_leaves_no_traceback(module: str) -> None:
+    interrupts = f"""
+import os, signal, sys
+
+class Finder:
+    def find_spec(name, path, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder)
+sys.argv = ["hmcs", "task", "check", "human-shapes"]
+from hmcs_local.entry import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", interrupts], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 def test_what_takes_the_interrupt_is_loaded_before_anything_else() -> None:
     listed = "import hmcs_local.entry, sys; print('typer' in sys.modules, 'hmcs' in sys.modules)"
     done = subprocess.run(
@@ -134,3 +190,15 @@ def test_the_version_and_completion_are_shown(hmcs: Run) -> None:
     done = subprocess.run(HMCS, capture_output=True, text=True, check=False, env=os.environ | asked)
     assert done.stdout.split() == ["segment"]
     assert "--install-completion" in hmcs("--help")[1]
+
+
+def test_what_is_asked_of_the_stack_is_checked_before_anything_is_learned(
+    hmcs: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(training, "train", lambda *_, **__: pytest.fail("it learned"))
+    write_csv(tmp_path / "d.csv", performed(1))
+    for words in (("--services", "nobody"), ("--scale", "nobody=2"), ("--source", "nobody")):
+        code, _, err = hmcs("up", "human-shapes", "d.csv", *words)
+        assert code == 2
+        assert "'nobody'" in err

@@ -84,6 +84,20 @@ def test_the_same_model_is_found_to_have_believed_the_same(hmcs: Run, take: Path
     assert "nan" not in ended.stdout
 
 
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_what_was_and_what_is_stand_side_by_side_at_any_width(
+    hmcs: Run, take: Path, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    out = hmcs("replay", str(take)).stdout
+    assert out.replace("\n", "").isprintable()
+    table = out.partition("note:")[0]
+    assert all(len(line.rstrip()) <= width for line in table.splitlines())
+    for words in ("same belief, bit by bit", "robot beside its guide, mean", "recorded lesson"):
+        assert words in " ".join(table.split())
+    assert "…" not in table
+
+
 def test_every_figure_of_the_json_line_stands_in_the_help(
     hmcs: Run, take: Path, models: dict[str, Path]
 ) -> None:
@@ -135,7 +149,7 @@ def test_a_folder_that_is_a_file_is_reported(hmcs: Run, take: Path, tmp_path: Pa
     (tmp_path / "tables").write_text("mine")
     ended = hmcs("export", str(take), "--to", "tables")
     assert ended.returncode == 2
-    assert "tables: cannot be written to" in ended.stderr
+    assert "--to: tables: is no folder" in ended.stderr
     assert (tmp_path / "tables").read_text() == "mine"
 
 

@@ -131,7 +131,7 @@ def test_labels_that_somebody_set_are_not_written_over(
     assert out.read_text() == "begin_s,end_s,state\n0,1,reach\n"
 
 
-def test_where_labels_cannot_be_written_is_told_before_anything_is_read(
+def test_where_labels_cannot_be_written_is_refused_before_anything_is_read(
     hmcs: Run, model: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -144,7 +144,7 @@ def test_where_labels_cannot_be_written_is_told_before_anything_is_read(
     assert "is a drawing" in err
 
 
-def test_a_kind_without_offline_segmentation_is_told_before_anything_is_read(
+def test_a_kind_without_offline_segmentation_is_refused_before_anything_is_read(
     hmcs: Run, tmp_path: Path
 ) -> None:
     file = tmp_path / "online.hmcs"

@@ -109,6 +109,22 @@ def test_the_table_shows_who_is_there(
     assert "nobody runs" not in table
 
 
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_a_process_is_shown_whole_at_any_width(
+    bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually, width: int
+) -> None:
+    fixture_controller(bus, active="mine", instance="fixture-controller-of-the-left-arm-1")
+    run(bus, "mine")
+    eventually(lambda: observe(bus).speakers)
+    _, table = shown(bus, width)
+    together = "".join(table.split())
+    for word in ("fixture-controller-of-the-left-arm-1", "ok", "cpu%", "late"):
+        assert word in together
+    assert table.replace("\n", "").isprintable()
+    assert all(len(line.rstrip()) <= width for line in table.splitlines())
+    assert "…" not in table
+
+
 @pytest.mark.parametrize("width", [80, 160])
 def test_that_nobody_runs_the_active_model_is_said_and_is_not_well(
     bus: Bus, fixture_controller: Callable[..., Any], eventually: Eventually, width: int

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from hmcs.bus.keys import check_name
 from hmcs.bus.rights import roles
+from hmcs.write_places import check_file_place
 from hmcs_secure.authority import (
     HOLDER_DAYS,
     Authority,
@@ -120,6 +121,8 @@ def router(
     folder: _Folder = DEFAULT_FOLDER,
 ) -> None:
     """Write a router's configuration: mutual TLS, default deny, the rules of every certificate."""
+    if output is not None:
+        check_file_place(output, "--output")
     authority = _authority(folder, cell)
     target = output or authority.folder / "router.json5"
     written = write_router_file(
@@ -151,7 +154,9 @@ def check(
     """Show every certificate and until when it is valid; exit code 1 where something is to do."""
     authority, now = _authority(folder, cell), utc_now()
     holders = holders_of(authority)
-    table = Table("holder", "valid until", "days left", "to do")
+    table = Table()
+    for column in ("holder", "valid until", "days left", "to do"):
+        table.add_column(column, overflow="fold")
     problems = 0
     for holder in holders:
         to_do = _to_do(holder, holder.days_left(now), within_days)

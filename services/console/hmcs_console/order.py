@@ -18,7 +18,7 @@ class Order(NamedTuple):
 
 
 def order_of(task: Task) -> Order:
-    """Return the order a task's file tells."""
+    """Return the order of a task's file."""
     return Order(
         max(task.start, key=lambda state: task.start[state]),
         {state.name: state.next for state in task.states},

@@ -134,7 +134,7 @@ class Guarded:
 
 
 class _NoSampleError(Exception):
-    """A sample is malformed, or no hand does what it tells."""
+    """A sample is malformed, or no hand does what it says."""
 
 
 class _SilentError(Exception):

@@ -13,7 +13,7 @@ from hmcs_input_device.sources import FARTHEST_M, LIVE, DeviceSample
 
 RATE_HZ = 100.0
 FOLLOW_S = 0.08
-"""Time constant with which the hand follows the handle: a page tells its place in jerks."""
+"""Time constant with which the hand follows the handle: a page sends its place in jerks."""
 FASTEST_M_S = 0.5
 """A handle that goes faster is followed no faster."""
 JUMP_M = 2.0
@@ -59,9 +59,9 @@ class HeldHandle:
         if another and self._holds(now_s):
             self.refusal = f"{handle.operator!r} does not operate: another page holds the handle"
         elif not np.abs(handle.position).max() <= FARTHEST_M:
-            self.refusal = f"{handle.operator!r} tells a handle farther than {FARTHEST_M:g} m"
+            self.refusal = f"{handle.operator!r} sends a handle farther than {FARTHEST_M:g} m"
             if not another:
-                self._fault = f"the page {handle.operator!r} tells a handle out of reach"
+                self._fault = f"the page {handle.operator!r} sends a handle out of reach"
         if self.refusal:
             return False
         if not handle.dead_man:

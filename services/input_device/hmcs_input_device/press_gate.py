@@ -17,7 +17,7 @@ class PressGate:
     """Lets a press through only once the switch was seen released since the last trouble.
 
     It begins shut, so that a switch which is held when the process comes up moves nothing. Trouble
-    shuts it: a device that is silent, gone or tells nonsense, and a hang of this process. It opens
+    shuts it: a device that is silent, gone or sends nonsense, and a hang of this process. It opens
     when the switch is seen released and then pressed, both without trouble.
     """
 

@@ -20,7 +20,7 @@ from hmcs.bus.messages import (
     Step,
 )
 from hmcs.bus.service import Service
-from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.session import Bus, Received, RequestRefusedError, StoppedError
 from hmcs.bus.verbs import LAST_STEPS, PLAY
 from hmcs.driving import FollowingRobot, heard_robot
 from hmcs.motion.steps import DeadZone
@@ -31,7 +31,7 @@ from hmcs_input_device.guarded import Guarded
 from hmcs_input_device.kept_steps import KeptSteps
 from hmcs_input_device.played import BUILT_IN
 from hmcs_input_device.playing import Playing
-from hmcs_input_device.reaction import Reaction, ReEngaging
+from hmcs_input_device.reaction import RELEASED_S, Reaction, ReEngaging
 from hmcs_input_device.settings import InputDeviceSettings
 from hmcs_input_device.simulated import Simulated
 from hmcs_input_device.sources import (
@@ -142,9 +142,13 @@ class InputDevice(Service):
             return
         self._hand = sample
         self._publish(sample, now_ns)
-        if elapsed_s is not None and elapsed_s > self._source.duration_s and not self._told_end:
+        if elapsed_s is None or elapsed_s <= self._source.duration_s:
+            return
+        if not self._told_end:
             self._told_end = True
             self.log.info("played to the end", extra={"steps": self._zone.count})
+        if self.settings.exit_when_played and elapsed_s > self._source.duration_s + RELEASED_S:
+            raise StoppedError
 
     def _sampled(self, now_s: float, elapsed_s: float | None) -> DeviceSample | None:
         released = self._reaction is not None and self._reaction.released

@@ -101,6 +101,9 @@ class InputDeviceSettings(ServiceSettings):
     seen."""
     repeat: int = Field(default=1, ge=0)
     """How many passes; 0 for ever."""
+    exit_when_played: bool = False
+    """End the process, with exit code 0, once all passes are played and the dead-man has been
+    released for a moment."""
     speed: float = Field(default=1.0, gt=0.0, le=100.0)
     """How many times as fast as recorded."""
     velocity_window_s: float = Field(default=0.02, gt=0.0, le=1.0)

@@ -12,8 +12,8 @@ know goes into the setting `options`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from importlib.metadata import entry_points
+from collections.abc import Callable, Collection, Mapping
+from importlib.metadata import EntryPoint, entry_points
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -23,6 +23,7 @@ from hmcs.bus.messages import Handle
 from hmcs.errors import UserError
 from hmcs.motion.device_sample import FARTHEST_M, FASTEST_M_S, LIVE, DeviceSample
 from hmcs.task import Task
+from hmcs.task.values import unknown_name_message
 from hmcs_input_device.settings import InputDeviceSettings
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "SourceFactory",
     "Troubled",
     "at_rest",
+    "check_source",
     "open_source",
     "plays",
     "released",
@@ -61,8 +63,8 @@ def at_rest(sample: DeviceSample) -> DeviceSample:
 class Source(Protocol):
     """A device, or something that plays one.
 
-    It tells what it sees of the device and judges nothing: whether a press of the dead-man counts,
-    and what becomes of nonsense, is decided in one place for all (`guarded`).
+    It passes on what it sees of the device and judges nothing: whether a press of the dead-man
+    counts, and what becomes of nonsense, is decided in one place for all (`guarded`).
     """
 
     @property
@@ -137,6 +139,20 @@ SourceFactory = Callable[[InputDeviceSettings, Task], Source]
 """Makes a source; raises UserError where the settings do not let it."""
 
 
+def check_source(name: str, built_in: Collection[str]) -> None:
+    """Raise UserError for a source that is neither built in nor of another distribution."""
+    known = {*built_in, *_others()}
+    if name not in known:
+        raise UserError(
+            f"source: {unknown_name_message('input source', name, known)}; a distribution adds one "
+            f"with an entry point in the group {ENTRY_POINTS}"
+        )
+
+
+def _others() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+
+
 def open_source(
     settings: InputDeviceSettings, task: Task, built_in: Mapping[str, SourceFactory]
 ) -> Source:
@@ -144,15 +160,10 @@ def open_source(
 
     Raises UserError where there is none of that name, it cannot be loaded, or refuses its settings.
     """
+    check_source(settings.source, built_in)
     if settings.source in built_in:
         return built_in[settings.source](settings, task)
-    others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
-    if settings.source not in others:
-        raise UserError(
-            f"source: no input source {settings.source!r} (choose of: "
-            f"{', '.join(sorted({*built_in, *others}))}; a distribution adds one with an entry "
-            f"point in the group {ENTRY_POINTS})"
-        )
+    others = _others()
     try:
         factory: SourceFactory = others[settings.source].load()
     except (ImportError, AttributeError) as error:

@@ -77,7 +77,7 @@ def test_a_reading_that_is_no_number_stops_the_hand_is_reported_and_leaves_no_tr
     assert not refused.dead_man
     np.testing.assert_array_equal(refused.velocity, np.zeros(3))
     np.testing.assert_array_equal(refused.position, here)
-    assert f"tells {value} for its axis y" in desk.source.trouble
+    assert f"gives {value} for its axis y" in desk.source.trouble
     assert not desk.tell(press="hold", times=100).dead_man
     assert "let go of it and press it anew" in desk.source.trouble
     desk.hold()
@@ -90,7 +90,7 @@ def test_a_device_of_too_few_axes_moves_nothing_and_says_so() -> None:
     desk.hold()
     desk.device.says = DeviceReading((1.0,), frozenset({"hold"}))
     np.testing.assert_array_equal(desk.ask(3).velocity, np.zeros(3))
-    assert "tells 1 axes, expected 6" in desk.source.trouble
+    assert "has 1 axes, expected 6" in desk.source.trouble
 
 
 def test_a_deflection_out_of_range_counts_as_full() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from hmcs.bus.messages import Ask, Done, LastSteps, LastStepsQuestion
 from hmcs.bus.service import run
-from hmcs.bus.session import RequestRefusedError
+from hmcs.bus.session import RequestRefusedError, StoppedError
 from hmcs.motion.demonstrations import Demonstration, write_csv
 from hmcs.motion.steps import steps_of
 from hmcs_input_device.service import InputDevice
@@ -147,3 +147,14 @@ def test_a_mistake_of_the_user_ends_it_with_code_2_and_one_message(
     message = capsys.readouterr().err.splitlines()[-1]
     assert message.startswith("input_device: ")
     assert said in message
+
+
+def test_a_process_that_is_to_end_with_what_it_plays_ends_once_the_hand_was_seen_to_let_go(
+    play: MakeDesk,
+) -> None:
+    desk = play(exit_when_played=True)
+    with pytest.raises(StoppedError):
+        desk.until(lambda: False, "its end")
+    held = [received.body.dead_man for received in desk.motions]
+    assert any(held)
+    assert not any(held[-20:])

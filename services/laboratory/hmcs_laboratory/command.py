@@ -11,6 +11,7 @@ from rich.console import Console
 
 from hmcs.errors import UserError
 from hmcs.task.values import unknown_name_message
+from hmcs.write_places import check_file_place
 from hmcs_laboratory.report import as_json, as_table, progress_shown, studies_table
 from hmcs_laboratory.running import measure
 from hmcs_laboratory.studies import STUDIES
@@ -18,6 +19,9 @@ from hmcs_laboratory.study import Study, StudySettings
 
 USER_MISTAKE = 2
 INTERRUPTED = 130
+
+PICTURES = (".png", ".svg")
+"""Endings of pictures that can be drawn."""
 
 _WIDTH = 160
 """Of tables that go to no terminal, characters."""
@@ -59,6 +63,8 @@ def run_study(
     if picture is not None and not study.picture:
         drawn = ", ".join(each.name for each in STUDIES if each.picture)
         raise UserError(f"--picture: study {name!r} has none; those that have: {drawn}")
+    if picture is not None:
+        _check_picture(picture)
     console = Console(stderr=True)
     if absent := study.left_out(settings):
         console.print(absent, highlight=False)
@@ -141,6 +147,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"hmcs_laboratory: {error}", file=sys.stderr)
         return USER_MISTAKE
+
+
+def _check_picture(file: Path) -> None:
+    if file.suffix not in PICTURES:
+        raise UserError(f"--picture {file}: expected a name that ends in {' or '.join(PICTURES)}")
+    check_file_place(file, "--picture")
+    if not file.parent.is_dir():
+        raise UserError(f"--picture {file}: there is no folder {file.parent}: make it")
 
 
 def _stdout() -> Console:

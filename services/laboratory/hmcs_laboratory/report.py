@@ -43,7 +43,9 @@ def as_table(result: StudyResult, shown: Sequence[str] = ()) -> Table:
 
 def studies_table(studies: Sequence[Study[StudySettings]]) -> Table:
     """Return a table of all studies, a line each."""
-    table = Table("study", "asks", "after", title="studies")
+    table = Table(title="studies")
+    for column in ("study", "asks", "after"):
+        table.add_column(column, overflow="fold")
     for study in studies:
         table.add_row(study.name, study.line, study.source)
     return table

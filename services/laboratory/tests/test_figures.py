@@ -251,7 +251,7 @@ def test_a_mistake_is_one_line_and_exit_code_2(arguments, message, capsys, tmp_p
 
 def test_a_folder_that_cannot_be_is_a_users_mistake(tmp_path):
     (tmp_path / "file").write_text("here already")
-    with pytest.raises(UserError, match="cannot be made a folder"):
+    with pytest.raises(UserError, match="is no folder"):
         make_figures(tmp_path / "file", numbers=["4.11"], fast=True)
     assert (tmp_path / "file").read_text() == "here already"
 

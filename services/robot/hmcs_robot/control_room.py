@@ -28,7 +28,7 @@ class ControlRoomError(CannotGoOnError):
 class ControlRoom:
     """A control process and the channel to it.
 
-    Raises UserError for a robot that cannot be, as its process tells it, and ControlRoomError where
+    Raises UserError for a robot that cannot be, as its process says, and ControlRoomError where
     that does not come up.
     """
 

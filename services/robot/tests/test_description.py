@@ -214,7 +214,7 @@ def limited(more: str, kind: str = "revolute") -> str:
         ),
     ],
 )
-def test_what_a_joint_lacks_is_assumed_and_told_with_its_line(
+def test_what_a_joint_lacks_is_assumed_and_reported_with_its_line(
     tmp_path: Path, text: str, said: list[str]
 ) -> None:
     described = describe(model(written(tmp_path, text)))
@@ -234,7 +234,7 @@ def test_what_a_joint_lacks_is_assumed_and_told_with_its_line(
         (link("l3"), link("l3").replace('ixx="0.002"', 'ixx="nan"'), "not of finite numbers"),
     ],
 )
-def test_an_inertia_that_cannot_be_is_assumed_and_told(
+def test_an_inertia_that_cannot_be_is_assumed_and_reported(
     tmp_path: Path, old: str, new: str, said: str
 ) -> None:
     described = describe(model(written(tmp_path, arm().replace(old, new))))
@@ -243,7 +243,7 @@ def test_an_inertia_that_cannot_be_is_assumed_and_told(
     assert describe(model(written(tmp_path, described.to_simulate()))).notes == ()
 
 
-def test_an_arm_that_says_all_is_told_nothing(robot: str) -> None:
+def test_of_an_arm_that_says_all_nothing_is_reported(robot: str) -> None:
     assert describe(ROBOTS[robot]).told == ""
 
 

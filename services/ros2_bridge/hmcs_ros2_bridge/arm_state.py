@@ -51,10 +51,10 @@ def joints_in(message: Any) -> Joints:
         velocities = np.zeros(len(positions))
     if not len(names) == len(positions) == len(velocities) <= MOST_JOINTS:
         raise NonsenseError(
-            f"tells {len(names)} joints, {len(positions)} positions, {len(velocities)} velocities"
+            f"has {len(names)} joints, {len(positions)} positions, {len(velocities)} velocities"
         )
     if not (np.isfinite(positions).all() and np.isfinite(velocities).all()):
-        raise NonsenseError("tells joints that are not finite")
+        raise NonsenseError("has joints that are not finite")
     return Joints(names, positions, velocities)
 
 

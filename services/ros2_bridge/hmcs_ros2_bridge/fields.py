@@ -19,7 +19,7 @@ Fields = dict[str, Any]
 
 
 class NonsenseError(ValueError):
-    """A ROS message tells what cannot be; says what."""
+    """A ROS message holds what cannot be; says what."""
 
 
 def header(stamp_ns: int, frame: str) -> Fields:
@@ -86,12 +86,12 @@ def pose_in(message: Any) -> tuple[Array, Array]:
 
 def check_frame(message: Any, frames: Iterable[str]) -> None:
     """Raise NonsenseError for a stamped message in a frame that is none of `frames`."""
-    told, known = message.header.frame_id.removeprefix("/"), tuple(frames)
-    if told not in known:
-        raise NonsenseError(f"is in the frame {told[:60]!r}, expected {' or '.join(known)}")
+    frame, known = message.header.frame_id.removeprefix("/"), tuple(frames)
+    if frame not in known:
+        raise NonsenseError(f"is in the frame {frame[:60]!r}, expected {' or '.join(known)}")
 
 
 def _finite(what: str, values: Array) -> Array:
     if not np.isfinite(values).all():
-        raise NonsenseError(f"tells {what} that is not finite")
+        raise NonsenseError(f"has {what} that is not finite")
     return values

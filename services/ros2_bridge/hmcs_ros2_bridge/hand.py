@@ -58,7 +58,7 @@ def stick_in(joy: Any, axes: Sequence[int | None], dead_band: float) -> Array:
             raise NonsenseError(f"has {len(joy.axes)} axes, none with the index {index}")
         values[place] = joy.axes[index]
     if not np.isfinite(values).all():
-        raise NonsenseError("tells an axis that is not finite")
+        raise NonsenseError("has an axis that is not finite")
     beyond = np.maximum(np.abs(values) - dead_band, 0.0) / (1.0 - dead_band)
     return shortened(np.sign(values) * beyond, 1.0)
 

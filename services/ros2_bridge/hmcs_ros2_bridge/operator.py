@@ -238,5 +238,5 @@ def open_source(settings: _HasOptions, task: Task) -> RosOperator:
 
 
 def _seconds(message: Any) -> float:
-    told = message.header.stamp
-    return float(told.sec + told.nanosec * 1e-9)
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9)

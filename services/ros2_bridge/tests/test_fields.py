@@ -44,9 +44,9 @@ def test_a_pose_comes_back_as_it_went(place: list[float]) -> None:
 
 @given(st.integers(0, 2**60))
 def test_a_stamp_has_every_nanosecond(time_ns: int) -> None:
-    told = stamp(time_ns)
-    assert told["sec"] * 1_000_000_000 + told["nanosec"] == time_ns
-    assert 0 <= told["nanosec"] < 1_000_000_000
+    stamped = stamp(time_ns)
+    assert stamped["sec"] * 1_000_000_000 + stamped["nanosec"] == time_ns
+    assert 0 <= stamped["nanosec"] < 1_000_000_000
 
 
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), -float("inf")])

@@ -60,7 +60,7 @@ def points(marker: Fields) -> np.ndarray:
     return np.array([[point[axis] for axis in "xyz"] for point in marker["points"]])
 
 
-def test_every_marker_is_told_apart_by_its_name_and_number_and_lies_in_the_frame() -> None:
+def test_every_marker_is_distinguished_by_its_name_and_number_and_lies_in_the_frame() -> None:
     markers = scene.standing(TASK, 7, "base_link")
     names = [(marker["ns"], marker["id"]) for marker in markers]
     assert len(set(names)) == len(names)
@@ -127,8 +127,8 @@ def test_no_preferred_direction_takes_the_arrow_away() -> None:
 
 
 def levels(seen: Seen) -> dict[str, tuple[bytes, str]]:
-    told = diagnostics(seen, ("robot/a",), 0)["status"]
-    return {each["name"].removeprefix("hmcs: "): (each["level"], each["message"]) for each in told}
+    shown = diagnostics(seen, ("robot/a",), 0)["status"]
+    return {each["name"].removeprefix("hmcs: "): (each["level"], each["message"]) for each in shown}
 
 
 def test_diagnostics_say_what_is_wrong_and_what_is_not_heard() -> None:
@@ -153,6 +153,6 @@ def test_joints_without_names_are_numbered() -> None:
 
 
 def test_json_has_every_field_with_arrays_as_lists() -> None:
-    told = json.loads(json_of(ROBOT)["data"])
-    assert told["tool_position"] == [0.1, 0.2, 0.3]
-    assert set(told) == set(RobotState.model_fields)
+    fields = json.loads(json_of(ROBOT)["data"])
+    assert fields["tool_position"] == [0.1, 0.2, 0.3]
+    assert set(fields) == set(RobotState.model_fields)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -60,7 +60,7 @@ class Check(NamedTuple):
     """What may be wrong, and what to do, the serious first."""
 
 
-def check_files(references: Sequence[str], task: Task | None, choices: Choices = AS_IT_IS) -> Check:
+def check_files(references: Iterable[str], task: Task | None, choices: Choices = AS_IT_IS) -> Check:
     """Judge what each reference names; what cannot be read is one serious finding.
 
     Where a task is given, labels are judged by it, and what is labeled as what is trained from

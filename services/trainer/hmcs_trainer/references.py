@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -63,7 +63,7 @@ def read_references(references: Sequence[str], task: Task) -> list[Demonstration
 
 
 def read_sources(
-    references: Sequence[str],
+    references: Iterable[str],
     task: Task | None,
     *,
     labels_count: bool = True,

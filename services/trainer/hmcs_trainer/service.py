@@ -1,4 +1,4 @@
-"""The service: trains when asked, in a process of its own, and tells how far it is."""
+"""The service: trains when asked, in a process of its own, and reports how far it is."""
 
 from __future__ import annotations
 

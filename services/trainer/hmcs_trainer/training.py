@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ from hmcs_trainer.validation import findings
 
 
 def checked(
-    task: Task, references: Sequence[str], progress: Callable[[str], None]
+    task: Task, references: Iterable[str], progress: Callable[[str], None]
 ) -> tuple[int, int]:
     """Return how many demonstrations would be learned from, and how many findings were reported.
 
@@ -47,7 +47,7 @@ def checked(
 
 
 def refuse(serious: Sequence[Finding]) -> None:
-    """Raise LearningError that tells all of these findings; nothing where there is none."""
+    """Raise LearningError with all of these findings; nothing where there is none."""
     if not serious:
         return
     hint = ". With --accept-implausible `hmcs train` learns from it all the same"
@@ -78,8 +78,8 @@ def sound(learned: Callable[[], Model]) -> Model:
 
 
 def train(
-    task: str,
-    references: list[str],
+    task: str | Task,
+    references: Iterable[str],
     output: str | Path,
     *,
     name: str | None = None,
@@ -94,7 +94,7 @@ def train(
     progress: Callable[[str], None] = lambda _: None,
     fits: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Model:
-    """Learn a model of the task, a shipped one's name or a file, and write it to `output`.
+    """Learn a model of a task, also by a shipped one's name or a file, and write it to `output`.
 
     The model is called `name`, or as the task is. `recognizer` is the kind to learn for, with
     `settings` of its own as text; of `choices` the best by held-out likelihood is taken, `fits` is
@@ -104,9 +104,9 @@ def train(
     whatever labels it has: they are written as a task beside the model, with the ending .yaml, and
     as labels beside each file; that task is called `name`, or as the model's file. Demonstrations
     that no hand made are refused unless `accept_implausible`; those that are given twice count
-    once. `choices_of_files` say how files of other programs are read. Raises a UserError that says
-    what is wrong with the task, a reference, a demonstration, the name, the recognizer or a
-    setting.
+    once. `choices_of_files` say how files of other programs are read. `references` are asked for
+    when all else has been checked. Raises a UserError that says what is wrong with the task, a
+    reference, a demonstration, the name, the recognizer or a setting.
     """
     if name is not None:
         check_name("model", name)
@@ -114,7 +114,7 @@ def train(
     check_file_place(Path(output), "--output")
     if report is not None:
         check_file_place(Path(report), "the report")
-    loaded = load_task(task)
+    loaded = task if isinstance(task, Task) else load_task(task)
     progress("reading demonstrations")
     sources, noted = _read(loaded, references, choices_of_files, find_states=find_states)
     found, task_file = None, Path(output).with_suffix(".yaml")
@@ -173,7 +173,7 @@ def train(
 
 
 def _read(
-    task: Task, references: Sequence[str], files: Choices = AS_IT_IS, *, find_states: bool
+    task: Task, references: Iterable[str], files: Choices = AS_IT_IS, *, find_states: bool
 ) -> tuple[list[Source], list[Finding]]:
     """What the references name, each demonstration once, and what should be known of it."""
     sources, doubled = distinct(

@@ -50,7 +50,7 @@ def test_a_sound_demonstration_is_measured(write: Write) -> None:
 
 
 @pytest.mark.parametrize("with_task", [False, True])
-def test_millimeters_are_told_and_refused(write: Write, with_task: bool) -> None:
+def test_millimeters_are_recognized_and_refused(write: Write, with_task: bool) -> None:
     shown = performed(1)
     file = write("d.csv", shown._replace(positions=3000 * shown.positions))
     check = check_files([file], lesson_task() if with_task else None)
@@ -68,7 +68,7 @@ def test_a_jump_is_no_matter_of_units(write: Write) -> None:
     assert any("at 1.000 s the hand jumps" in text for text in serious(check))
 
 
-def test_milliseconds_are_told_and_trained_from(write: Write) -> None:
+def test_milliseconds_are_recognized_and_trained_from(write: Write) -> None:
     shown = performed(1)
     check = check_files([write("d.csv", shown._replace(time_s=1000 * shown.time_s))], None)
     assert (only(check).verdict, only(check).units) == ("mind", "m, s or not?")
@@ -76,7 +76,7 @@ def test_milliseconds_are_told_and_trained_from(write: Write) -> None:
     assert any("in milliseconds" in finding.text for finding in check.findings)
 
 
-def test_a_way_out_of_the_workspace_is_told(write: Write) -> None:
+def test_a_way_out_of_the_workspace_is_reported(write: Write) -> None:
     shown = performed(1)
     check = check_files(
         [write("d.csv", shown._replace(positions=6 * shown.positions))], lesson_task()
@@ -107,7 +107,7 @@ def test_what_training_refuses_is_refused_here(write: Write) -> None:
     assert {judged.name: judged.verdict for judged in check.judged}["w.csv"] == "no"
 
 
-def test_motion_without_labels_is_judged_for_itself_and_told_what_to_do(write: Write) -> None:
+def test_motion_without_labels_is_judged_for_itself_with_what_to_do(write: Write) -> None:
     shown = performed(1)
     bare = write("bare.csv", shown._replace(states=(None,) * len(shown.states)))
     check = check_files([bare, write("d.csv", performed(2))], lesson_task())
@@ -116,19 +116,19 @@ def test_motion_without_labels_is_judged_for_itself_and_told_what_to_do(write: W
     assert any("bare.csv: has no labels" in finding.text for finding in check.findings)
 
 
-def test_two_dimensions_among_three_are_told_in_one_line_before_they_disagree(
+def test_two_dimensions_among_three_are_reported_in_one_line_before_they_disagree(
     write: Write,
 ) -> None:
     flat = performed(1)
     files = [write("flat.csv", flat._replace(positions=flat.positions * (1, 1, 0)))]
     files += [write(f"d{k}.csv", performed(k)) for k in (2, 3)]
-    with pytest.raises(LearningError) as told:
+    with pytest.raises(LearningError) as refused:
         checked(lesson_task(), files, lambda _: None)
-    assert "flat.csv: 'lift' stays in the plane z = 0" in str(told.value)
-    assert "another way" not in str(told.value)
+    assert "flat.csv: 'lift' stays in the plane z = 0" in str(refused.value)
+    assert "another way" not in str(refused.value)
 
 
-def test_a_plane_among_motions_in_space_is_told(write: Write) -> None:
+def test_a_plane_among_motions_in_space_is_reported(write: Write) -> None:
     flat = performed(1)
     flat = flat._replace(positions=flat.positions * (1, 1, 0))
     check = check_files([write("flat.csv", flat), write("d.csv", performed(2))], None)

@@ -1,4 +1,4 @@
-"""What a recording tells of itself: channels, rates, gaps, who was there, what is missing."""
+"""What is known of a recording: channels, rates, gaps, who was there, what is missing."""
 
 from __future__ import annotations
 

@@ -184,7 +184,7 @@ def _strangers(
 
 
 def _state_of(label: Stretch) -> str:
-    """The state a label tells, without the gesteme it may name besides."""
+    """The state a label names, without the gesteme it may name besides."""
     return label.state.partition("/")[0]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
@@ -107,9 +108,17 @@ def find_task(path_or_name: str | Path) -> Path:
         read_bounded(path_or_name, MOST_BYTES)
     except UnreadableFileError as error:
         names = ", ".join(shipped_tasks())
-        message = f"{error.what}; expected a task file or one of the shipped tasks ({names})"
+        near = get_close_matches(str(path_or_name), _task_names(Path(path_or_name).parent), n=1)
+        guess = f", did you mean {near[0]}?" if near else ";"
+        message = f"{error.what}{guess} expected a task file or one of the shipped tasks ({names})"
         raise TaskFileError([Problem(str(path_or_name), 1, "", message)]) from error
     return Path(path_or_name)
+
+
+def _task_names(folder: Path) -> list[str]:
+    """What a task can be called: the shipped ones, and the files of a folder."""
+    files = folder.glob("*.y*ml") if folder.is_dir() else ()
+    return [*shipped_tasks(), *map(str, files)]
 
 
 def _with_files_beside(task: Task, file: Path) -> Task:

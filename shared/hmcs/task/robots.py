@@ -25,8 +25,8 @@ def known_robots() -> tuple[str, ...]:
 def check_robot(name: str) -> str:
     """Return a robot's name; raises ValueError, which names the nearest, where there is none."""
     if name not in SHIPPED and name not in known_robots():
-        told = unknown_name_message("robot", name, known_robots())
-        raise ValueError(f"{told}; for an arm of your own give urdf: FILE in place of model")
+        unknown = unknown_name_message("robot", name, known_robots())
+        raise ValueError(f"{unknown}; for an arm of your own give urdf: FILE in place of model")
     return name
 
 

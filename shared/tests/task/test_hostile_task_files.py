@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
-from hmcs.task import Problem, TaskFileError, check_task, load_task
+from hmcs.task import TaskFileError, load_task
 from hmcs.task.file import LONGEST_MESSAGE, MOST_BYTES, MOST_TOLD
 from hmcs.task.yaml_lines import DEEPEST, LONGEST_NUMBER, MOST_NODES, YamlError, read_yaml
+from support.task_files import Check
 
 HEAD = """\
 format: hmcs-task/1
@@ -49,19 +50,6 @@ def multiplied(first: str, entry: str) -> str:
         aliases = ",".join(f"*{inner}" for _ in range(9))
         lines.append(f"{outer}: &{outer} {entry.format(aliases)}")
     return "\n".join(lines)
-
-
-Check = Callable[[str], list[Problem]]
-
-
-@pytest.fixture
-def check(tmp_path: Path) -> Check:
-    def checked(text: str) -> list[Problem]:
-        file = tmp_path / "task.yaml"
-        file.write_text(text, encoding="utf-8")
-        return check_task(file)
-
-    return checked
 
 
 HOSTILE = {

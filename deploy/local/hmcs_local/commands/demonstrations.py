@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs_local.commands.options import (
     Columns,
+    Folder,
     Link,
     Marks,
     Times,
@@ -17,7 +17,10 @@ from hmcs_local.commands.options import (
     Units,
     Urdf,
     file_choices,
+    note,
 )
+from hmcs_local.stack import DEFAULT_FOLDER
+from hmcs_local.tables import screen
 
 FILES = (
     "CSV files, recordings, bags of ROS, LeRobot data sets, folders of them, patterns, "
@@ -48,6 +51,7 @@ def segment(
     urdf: Urdf = None,
     link: Link = "",
     marks: Marks = "",
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Find the segments of whole motions: which part of the task each moment was.
 
@@ -59,7 +63,12 @@ def segment(
 
     choices = file_choices(topics, columns, units, time, urdf, link, marks)
     segment_files(
-        expanded(files), model, out=out, anywhere=anywhere, console=Console(), choices=choices
+        expanded(files, folder, note),
+        model,
+        out=out,
+        anywhere=anywhere,
+        console=screen(),
+        choices=choices,
     )
 
 
@@ -75,6 +84,7 @@ def check(
     urdf: Urdf = None,
     link: Link = "",
     marks: Marks = "",
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Judge demonstrations: units, rate, length, extent, workspace, states, and what to do.
 
@@ -84,7 +94,8 @@ def check(
     from hmcs_local.demonstration_files import expanded
 
     choices = file_choices(topics, columns, units, time, urdf, link, marks)
-    raise typer.Exit(0 if show_check(expanded(files), task, Console(), choices) else 2)
+    named = expanded(files, folder, note)
+    raise typer.Exit(0 if show_check(named, task, screen(), choices) else 2)
 
 
 def import_files(
@@ -100,6 +111,7 @@ def import_files(
     urdf: Urdf = None,
     link: Link = "",
     marks: Marks = "",
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Make CSV files, as `hmcs train` reads them, of what other programs recorded.
 
@@ -110,5 +122,5 @@ def import_files(
     from hmcs_local.importing import import_as_csv
 
     choices = file_choices(topics, columns, units, time, urdf, link, marks)
-    for note in import_as_csv(expanded(sources), to, choices, typer.echo):
-        typer.echo(note, err=True)
+    for taken in import_as_csv(expanded(sources, folder, note), to, choices, typer.echo):
+        note(taken)

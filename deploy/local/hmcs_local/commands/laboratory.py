@@ -63,7 +63,7 @@ def figures(
         str, typer.Option(metavar="NUMBERS", help="These alone, e.g. 2.6,4.12; all if none.")
     ] = "",
 ) -> None:
-    """Make the figures of the thesis anew, with a page that tells what came out of each."""
+    """Make the figures of the thesis anew, with a page on what came out of each."""
     from hmcs_laboratory.command import numbers_of, run_figures
 
     raise typer.Exit(

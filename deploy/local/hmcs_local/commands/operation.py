@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import typer
-from rich.console import Console
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs_local.commands.options import Cell, Router, Secure
 from hmcs_local.commands.replies import tell_replies
+from hmcs_local.tables import screen
 
 
 def devices() -> None:
@@ -17,7 +17,7 @@ def devices() -> None:
     """
     from hmcs_local.devices import show_devices
 
-    raise typer.Exit(0 if show_devices(Console()) else 1)
+    raise typer.Exit(0 if show_devices(screen()) else 1)
 
 
 def stop(router: Router = DEFAULT_ROUTER, cell: Cell = "demo", secure: Secure = None) -> None:

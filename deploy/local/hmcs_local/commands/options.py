@@ -40,6 +40,12 @@ Folder = Annotated[
     Path, typer.Option(metavar="DIR", help="Where `hmcs up` keeps logs, models and recordings.")
 ]
 
+
+def note(line: str) -> None:
+    """Say on standard error what a name was taken for."""
+    typer.echo(line, err=True)
+
+
 Topics = Annotated[
     list[str] | None,
     typer.Option(

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
 from hmcs_local.commands.options import Cell, Folder, Router, Secure
 from hmcs_local.stack import DEFAULT_FOLDER
+from hmcs_local.tables import screen
 
 
 def recognizers(
@@ -25,9 +25,9 @@ def recognizers(
     from hmcs_local.recognizers import show_kind, show_kinds
 
     if name is None:
-        show_kinds(kinds(), Console())
+        show_kinds(kinds(), screen())
     else:
-        show_kind(kind_named(name), Console())
+        show_kind(kind_named(name), screen())
 
 
 def swap(
@@ -70,10 +70,13 @@ def swap(
 
     if bool(instance) == bool(activate) or (command and not instance) or (load and instance):
         raise UserError("name either a classifier to replace or a model to --activate")
+    control = Control(folder)
+    if instance:
+        control.check_there()
     with interruptible(), open_operator(router, cell, secure) as bus:
         if instance:
             swapping.replace_classifier(
-                bus, Control(folder), instance, command=shlex.split(command), tell=typer.echo
+                bus, control, instance, command=shlex.split(command), tell=typer.echo
             )
             return
         partly = False
@@ -109,6 +112,7 @@ def deploy(
     it for a while, and is activated; the old one leaves then. All of it belongs to the `hmcs up` of
     --folder.
     """
+    from hmcs.recognition.model_file import load_model
     from hmcs_local import deploying
     from hmcs_local.connecting import open_operator
     from hmcs_local.control import Control
@@ -117,7 +121,11 @@ def deploy(
 
     if (model is None) != back:
         raise UserError("name either a model file or --back")
+    if model is not None:
+        # What is wrong with it is known before anybody is asked.
+        load_model(model)
     control = Control(folder)
+    control.check_there()
     with interruptible(), open_operator(router, cell, secure) as bus:
         try:
             if model is None:

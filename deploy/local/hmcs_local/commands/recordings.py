@@ -6,12 +6,24 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
-from hmcs_local.commands.options import Cell, Router, Secure
+from hmcs.task.values import unknown_name_message
+from hmcs.write_places import check_folder_place, check_new_folder_place
+from hmcs_local.commands.options import Cell, Folder, Router, Secure, note
 from hmcs_local.commands.replies import tell_replies
+from hmcs_local.stack import DEFAULT_FOLDER
+from hmcs_local.tables import screen
+
+Recording = Annotated[
+    Path,
+    typer.Argument(
+        help="An MCAP file of the recorder; its name alone where it lies among the recordings of "
+        "`hmcs up`."
+    ),
+]
+FORMATS = ("csv", "npz", "lerobot", "rosbag2")
 
 
 def record(
@@ -52,22 +64,25 @@ def mark(
 
 
 def inspect(
-    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    recording: Recording,
     as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON.")] = False,
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Show what a recording holds, channel by channel, and what is missing.
 
     A file that was cut off is read as far as it goes. The exit code is 0 where nothing is missing,
     else 1.
     """
+    from hmcs_local.recorded_files import recording_named
     from hmcs_local.recordings import show_inspection
 
-    whole = show_inspection(recording, Console(soft_wrap=True), as_json=as_json)
+    file = recording_named(recording, folder, note)
+    whole = show_inspection(file, screen(), as_json=as_json)
     raise typer.Exit(0 if whole else 1)
 
 
 def label(
-    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    recording: Recording,
     sets: Annotated[
         list[str] | None,
         typer.Option(
@@ -82,6 +97,7 @@ def label(
     task: Annotated[
         str, typer.Option(help="Labels must be states of it: a shipped task's name or a file.")
     ] = "",
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Show which part of the task each moment of a recording was, or say it afterwards.
 
@@ -89,18 +105,20 @@ def label(
     """
     from hmcs.task import load_task
     from hmcs_local.labeling import label_recording
+    from hmcs_local.recorded_files import recording_named
 
+    held_to = load_task(task) if task else None
     label_recording(
-        recording,
+        recording_named(recording, folder, note),
         sets or [],
         clear=clear,
-        task=load_task(task) if task else None,
-        console=Console(soft_wrap=True),
+        task=held_to,
+        console=screen(),
     )
 
 
 def export(
-    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    recording: Recording,
     to: Annotated[Path, typer.Option(metavar="DIR", help="The folder the files are written to.")],
     form: Annotated[
         str,
@@ -113,26 +131,30 @@ def export(
     fps: Annotated[
         int, typer.Option(metavar="HZ", min=1, max=1000, help="Frames a second, for lerobot.")
     ] = 30,
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Write a recording for other programs.
 
     As CSV or as NumPy arrays a file for every channel; as `lerobot` (v2.1) or `rosbag2` (MCAP)
     one folder, which must not be there yet.
     """
+    from hmcs_local.recorded_files import recording_named
     from hmcs_local.recordings import export_recording, export_to_others
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = screen()
     match form:
         case "csv" | "npz":
-            export_recording(recording, to, form, console)
+            check_folder_place(to, "--to")
+            export_recording(recording_named(recording, folder, note), to, form, console)
         case "lerobot" | "rosbag2":
-            export_to_others(recording, to, form, fps, console)
+            check_new_folder_place(to, "--to")
+            export_to_others(recording_named(recording, folder, note), to, form, fps, console)
         case _:
-            raise UserError(f"--format {form}: expected csv, npz, lerobot or rosbag2")
+            raise UserError(f"--format: {unknown_name_message('format', form, FORMATS)}")
 
 
 def replay(
-    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    recording: Recording,
     model: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Another model; by default the one kept with it."),
@@ -157,6 +179,7 @@ def replay(
     router: Router = DEFAULT_ROUTER,
     cell: Cell = "demo",
     secure: Secure = None,
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Let a recorded operator move again: in process beside what was believed then, or live.
 
@@ -175,11 +198,16 @@ def replay(
     `_takes_hold_later_ms` `_recorded_lets_go` `_replayed_lets_go` `_lets_go_later_ms`,
     `_times_real`; `notes` on what is missing. null where there is nothing to measure.
     """
+    from hmcs.recognition.model_file import load_model
     from hmcs_local.connecting import reached
-    from hmcs_local.replays import Files, replay_in_process, replay_live
+    from hmcs_local.recorded_files import recording_named
+    from hmcs_local.replays import Files, check_files, replay_in_process, replay_live
 
     if live:
         to = reached("input_device", router, cell, secure)
-        raise typer.Exit(replay_live(recording, rate, task, to))
-    console = Console(soft_wrap=True)
-    replay_in_process(recording, model, Files(out, picture), console, as_json=as_json)
+        raise typer.Exit(replay_live(recording_named(recording, folder, note), rate, task, to))
+    files = Files(out, picture)
+    check_files(files)
+    given = None if model is None else load_model(model)
+    file = recording_named(recording, folder, note)
+    replay_in_process(file, given, files, screen(), as_json=as_json)

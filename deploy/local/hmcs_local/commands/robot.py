@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from hmcs_local.tables import screen
 
 
 def check(
@@ -33,11 +34,11 @@ def check(
     """
     from hmcs_local.robots import check_robot
 
-    check_robot(file, tool_link, base_link, tuple(package_path or ()), output, Console())
+    check_robot(file, tool_link, base_link, tuple(package_path or ()), output, screen())
 
 
 def list_robots() -> None:
     """Name the robots that come along, as a task file names them."""
     from hmcs_local.robots import show_robots
 
-    show_robots(Console())
+    show_robots(screen())

@@ -13,8 +13,10 @@ from rich.text import Text
 
 from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs.errors import UserError
-from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure
+from hmcs.write_places import check_folder_place
+from hmcs_local.commands.options import Cell, Folder, Open, Router, Secure, note
 from hmcs_local.stack import DEFAULT_FOLDER, LocalStack
+from hmcs_local.tables import screen
 
 
 def up(
@@ -97,6 +99,7 @@ def up(
     from hmcs_secure.closed_cell import find_closed_cell
     from hmcs_secure.router_file import DEFAULT_LISTEN
 
+    check_folder_place(folder, "--folder")
     if signed_models and not secure:
         raise UserError("--signed-models: name the closed cell whose key counts, by --secure")
     closed = find_closed_cell(secure, signed_models=signed_models) if secure else None
@@ -105,13 +108,16 @@ def up(
     chosen = tuple(name.strip() for name in services.split(",") if name.strip())
     console = Console(highlight=False, soft_wrap=True)
     spec = load_compose(compose or find_compose(Path.cwd()), os.environ)
+    scales = dict(_scale(item) for item in scale or [])
+    for name in (*chosen, *scales):
+        spec.service(name)
     for name in unheard(os.environ, spec.variables | _OWN_VARIABLES):
         console.print(
             f"hmcs: {name} in the environment reaches no process: {spec.path} says what each is "
             "given; `hmcs up --help` lists what can be changed"
         )
-    named, files = _one_task(task, task_option), tuple(expanded(demonstrations or ()))
-    named = named or task_named(os.environ)
+    named = _one_task(task, task_option) or task_named(os.environ)
+    files = tuple(expanded(demonstrations or (), folder, note))
     wanted = Wanted(named, files, model, source, recognizer)
     arrangement = arrangement_of(spec, folder, wanted, typer.echo)
 
@@ -126,10 +132,10 @@ def up(
 
     code = run_up(
         lambda while_waiting: LocalStack(
-            compose,
+            spec,
             services=chosen or arrangement.services,
             environment=arrangement.environment,
-            scale=dict(_scale(item) for item in scale or []),
+            scale=scales,
             router=router,
             folder=folder,
             open_to_network=open_to_network,
@@ -157,7 +163,7 @@ def status(
     from hmcs_local.status import show_status
 
     with open_observer(router, cell, secure) as bus:
-        well = show_status(bus, Console(), once=once)
+        well = show_status(bus, screen(), once=once)
     raise typer.Exit(0 if well else 1)
 
 

@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 
 from hmcs.errors import UserError
+from hmcs_local.commands.options import Folder, note
 from hmcs_local.new_task import PLACES, PLANES, STATES, task_name_of, write_new_task
+from hmcs_local.stack import DEFAULT_FOLDER
 
 
 def new(
@@ -43,8 +45,11 @@ def check(
     file: Annotated[str, typer.Argument(help="A task file, or a shipped task's name.")],
     demonstrations: Annotated[
         list[str] | None,
-        typer.Argument(help="CSV files, or lasa:SHAPE/NUMBER: whether they fit it and agree."),
+        typer.Argument(
+            help="CSV files, recordings, lasa:SHAPE/NUMBER: whether they fit it and agree."
+        ),
     ] = None,
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Name every problem of a task file, with line and field; exit code 2 where there is one.
 
@@ -62,7 +67,7 @@ def check(
         typer.echo(line)
     shown = ""
     if demonstrations:
-        count, findings = checked(task, expanded(demonstrations), typer.echo)
+        count, findings = checked(task, expanded(demonstrations, folder, note), typer.echo)
         shown = f"; {count} demonstrations agree" + (
             ", apart from the findings above" if findings else ""
         )

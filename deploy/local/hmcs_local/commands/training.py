@@ -11,6 +11,7 @@ from hmcs.bus.config import DEFAULT_ROUTER
 from hmcs_local.commands.options import (
     Cell,
     Columns,
+    Folder,
     Link,
     Marks,
     Router,
@@ -20,9 +21,11 @@ from hmcs_local.commands.options import (
     Units,
     Urdf,
     file_choices,
+    note,
     setting,
 )
 from hmcs_local.commands.replies import tell_replies
+from hmcs_local.stack import DEFAULT_FOLDER
 
 
 def train(
@@ -78,10 +81,11 @@ def train(
     urdf: Urdf = None,
     link: Link = "",
     marks: Marks = "",
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Learn a model of a task from demonstrations: CSV files, recordings, or human drawings.
 
-    The page tells how each demonstration is recognized by a model of the others, which states are
+    The page shows how each demonstration is recognized by a model of the others, which states are
     taken for each other, how far demonstrations lay apart, and what would help. States that are
     found stand as labels beside each recording and as a task file, MODEL with the ending .yaml.
     """
@@ -94,7 +98,7 @@ def train(
     with fits_shown(bool(alternatives)) as fits:
         model = learn(
             task,
-            expanded(demonstrations),
+            expanded(demonstrations, folder, note),
             output,
             name=name,
             recognizer=recognizer,

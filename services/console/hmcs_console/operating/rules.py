@@ -60,7 +60,7 @@ def led_to(grip: Grip, handle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def position_of(value: Any) -> NDArray[np.float64] | None:
-    """Return the position a page tells, m, base frame, shape (3,); None where that is none."""
+    """Return the position a page sends, m, base frame, shape (3,); None where that is none."""
     try:
         position = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Recordings as the recorder tells of them, and labels it is to write down."""
+"""Recordings as the recorder lists them, and labels it is to write down."""
 
 from __future__ import annotations
 

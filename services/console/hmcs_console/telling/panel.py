@@ -226,7 +226,7 @@ class Panel:
             self._files.value = ", ".join([*there, path])  # type: ignore[misc]
 
     def _take_states(self, states: tuple[str, ...]) -> None:
-        """Once a recognizer tells what the states are, where no task did."""
+        """Once a recognizer says what the states are, where no task did."""
         if states == self._states:
             return
         self._states = states

@@ -60,9 +60,9 @@ class Reasons(NamedTuple):
     likely: str
     gesteme: str
     progress: float | None
-    """Along the guide, 0 to 1; None where nobody tells."""
+    """Along the guide, 0 to 1; None where it is unknown."""
     left_m: float | None
-    """To the end of the guide, m of the hand; None where nobody tells."""
+    """To the end of the guide, m of the hand; None where it is unknown."""
     support: tuple[Support, ...]
     rivals: tuple[Rival, ...]
     """The most probable first."""

@@ -26,9 +26,9 @@ a stick."""
 class DeviceSource:
     """The hand that moves a device.
 
-    It rests for as long as the device is gone, silent, tells nonsense, or has an axis that is not
+    It rests for as long as the device is gone, silent, sends nonsense, or has an axis that is not
     at rest when the dead-man is pressed, so that the robot stops at once and for a reason that
-    `trouble` tells. What then ends that is one rule for all sources, see `PressGate`.
+    `trouble` says. What then ends that is one rule for all sources, see `PressGate`.
     """
 
     rate_hz = RATE_HZ
@@ -38,7 +38,7 @@ class DeviceSource:
     def __init__(
         self, device: Device, rules: Rules, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Ask `device`; `clock` tells seconds."""
+        """Ask `device`; `clock` returns seconds."""
         self._device = device
         self._rules = rules
         self._clock = clock

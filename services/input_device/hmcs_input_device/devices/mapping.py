@@ -19,7 +19,7 @@ from hmcs_input_device.settings import AxisName, DeviceSettings
 from hmcs_input_device.sources import FARTHEST_M
 
 FOLLOW_S = 0.08
-"""Time constant with which the hand follows a pointer, which tells its place in jerks; also the
+"""Time constant with which the hand follows a pointer, which sends its place in jerks; also the
 longest time that one reading moves the hand for: nobody knows what a device did meanwhile."""
 FARTHEST_PIXELS = 1e6
 """No screen is larger."""
@@ -217,10 +217,10 @@ def deflected(reading: DeviceReading, rules: Rules) -> str:
 def problem_with(last: DeviceReading | None, reading: DeviceReading, rules: Rules) -> str:
     """Return why a reading after `last` cannot be used; empty where it can."""
     if len(reading.axes) != len(AXES):
-        return f"tells {len(reading.axes)} axes, expected {len(AXES)}"
+        return f"has {len(reading.axes)} axes, expected {len(AXES)}"
     for name, value in zip(AXES, reading.axes, strict=True):
         if not math.isfinite(value):
-            return f"tells {value} for its axis {name}"
+            return f"gives {value} for its axis {name}"
     if rules.kind == "position":
         return _pointer_problem(reading)
     if last is None or rules.switches:
@@ -263,5 +263,5 @@ def _limited(vector: Array, most: float) -> Array:
 def _pointer_problem(reading: DeviceReading) -> str:
     pointer = reading.pointer
     if pointer is None or not all(abs(place) <= FARTHEST_PIXELS for place in pointer):
-        return f"tells {pointer} for the place of its pointer"
+        return f"gives {pointer} for the place of its pointer"
     return ""

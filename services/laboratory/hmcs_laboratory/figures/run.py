@@ -17,6 +17,7 @@ from matplotlib.figure import Figure as Picture
 from threadpoolctl import threadpool_limits
 
 from hmcs.errors import UserError
+from hmcs.write_places import check_folder_place
 from hmcs_laboratory.figures.catalog import find_figures
 from hmcs_laboratory.figures.drawing import Files, Number, files_of, house_style
 from hmcs_laboratory.figures.figure import Figure
@@ -68,10 +69,8 @@ def make_figures(
         if value is not None and value < least:
             raise UserError(f"--{name} {value}: expected {least} or more")
     figures = find_figures(numbers)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--output {folder}: cannot be made a folder: {error.strerror}") from error
+    check_folder_place(folder, "--output")
+    folder.mkdir(parents=True, exist_ok=True)
     made: dict[str, Made] = {}
     for each in _made(figures, fast, seed, workers):
         name = next(figure.name for figure in figures if figure.number == each.number)
@@ -103,17 +102,15 @@ def write(path: Path, content: bytes) -> None:
 
 
 def draw_study(study: Study[Any], rows: Sequence[Row], path: Path) -> None:
-    """Draw the rows of a study that has a picture to a file, .png or .svg.
+    """Draw the rows of a study that has a picture to a file, .svg by its ending or else PNG.
 
-    Raises UserError for another ending, and where the file cannot be written.
+    Raises UserError where the file cannot be written.
     """
-    if path.suffix not in (".png", ".svg"):
-        raise UserError(f"{path}: expected a file that ends in .png or .svg")
     module, _, function = study.picture.partition(":")
     draw: Callable[[Sequence[Row]], Picture] = getattr(import_module(module), function)
     with house_style():
         files = files_of(draw(rows))
-    write(path, files.png if path.suffix == ".png" else files.svg)
+    write(path, files.svg if path.suffix == ".svg" else files.png)
 
 
 def make(figure: Figure[Any], *, fast: bool, seed: int) -> Made:

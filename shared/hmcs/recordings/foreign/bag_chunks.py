@@ -55,7 +55,7 @@ def _check_record(path: Path, stream: BinaryIO, size: int) -> None:
 
 
 def _check_unpacked(path: Path, compression: bytes, packed: bytes) -> None:
-    """Count what comes out of a chunk; what is no such packing the library tells."""
+    """Count what comes out of a chunk; what is no such packing is the library's to say."""
     left = LARGEST_CHUNK_BYTES + 1
     while packed and left > 0:
         unpacking = (

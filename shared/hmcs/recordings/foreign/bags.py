@@ -97,8 +97,8 @@ def bag_at(path: Path) -> Log:
 def _files_of(folder: Path) -> tuple[list[str], str]:
     file = folder / METADATA
     try:
-        told = yaml.safe_load(read_bounded(file, MOST_METADATA_BYTES))
-        information = told["rosbag2_bagfile_information"]
+        metadata = yaml.safe_load(read_bounded(file, MOST_METADATA_BYTES))
+        information = metadata["rosbag2_bagfile_information"]
         names = [Path(str(each)).name for each in information["relative_file_paths"]]
         kind = str(information["storage_identifier"])
         packed = str(information.get("compression_mode") or "none").lower()

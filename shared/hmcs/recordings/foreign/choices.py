@@ -67,6 +67,8 @@ def choices_of(
         raise UserError(f"--time {time}: expected one of {', '.join((*SECONDS, ISO))}")
     if link and urdf is None:
         raise UserError(f"--link {link}: is a link of a URDF: name that by --urdf")
+    if urdf is not None and not urdf.is_file():
+        raise UserError(f"--urdf {urdf}: no such file")
     return Choices(tuple(topics), _columns(columns), lengths, angles, time, urdf, link,
                    _marks(marks))  # fmt: skip
 

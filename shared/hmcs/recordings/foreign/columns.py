@@ -1,6 +1,6 @@
 """Tables with columns of other names and units, as demonstrations: which column is what.
 
-A header tells by itself where its names are known ones and carry their units, e.g.
+A header is enough by itself where its names are known ones and carry their units, e.g.
 `timestamp_ms,tcp_x_mm,tcp_y_mm,tcp_z_mm`. Columns a person names come first.
 """
 
@@ -62,7 +62,7 @@ class Column(NamedTuple):
     name: str
     """As it is written."""
     unit: str
-    """As the name tells it; empty where it does not."""
+    """As the name says it; empty where it does not."""
 
 
 def columns_in(names: Sequence[str], choices: Choices, where: str) -> dict[str, Column]:
@@ -109,7 +109,7 @@ def _unit_of(name: str) -> str:
 
 
 def _guessed(name: str) -> tuple[str, str]:
-    """The role a name tells, and the unit; empty where it tells none."""
+    """The role and the unit that a name says; empty where it says none."""
     words, unit = _words(name), _unit_of(name)
     if unit:
         words = words[:-1]

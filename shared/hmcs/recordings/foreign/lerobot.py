@@ -194,8 +194,8 @@ def _width(feature: Mapping[str, Any]) -> int:
     return shape[0] if numbers and 1 < shape[0] <= MOST_NUMBERS else 0
 
 
-def _names(told: Any) -> tuple[str, ...]:
+def _names(given: Any) -> tuple[str, ...]:
     """Names of numbers: a list, or lists by what they are of."""
-    if isinstance(told, dict):
-        return tuple(name for each in told.values() for name in _names(each))
-    return tuple(str(each) for each in told) if isinstance(told, list) else ()
+    if isinstance(given, dict):
+        return tuple(name for each in given.values() for name in _names(each))
+    return tuple(str(each) for each in given) if isinstance(given, list) else ()

@@ -118,8 +118,8 @@ def _arrow(arrow: Any, values: NDArray[Any]) -> Any:
 
 def _stats(values: NDArray[Any]) -> dict[str, list[Any]]:
     rows = values.reshape(len(values), -1)
-    told = {"min": rows.min(0), "max": rows.max(0), "mean": rows.mean(0), "std": rows.std(0)}
-    return {**{name: each.tolist() for name, each in told.items()}, "count": [len(rows)]}
+    measures = {"min": rows.min(0), "max": rows.max(0), "mean": rows.mean(0), "std": rows.std(0)}
+    return {**{name: each.tolist() for name, each in measures.items()}, "count": [len(rows)]}
 
 
 def _info(names: Sequence[str], episodes: int, frames: int, fps: int) -> dict[str, Any]:

@@ -44,7 +44,7 @@ class Mapped:
         self.notes: list[str] = []
 
     def __call__(self, table: CsvTable) -> CsvTable:
-        """Return a table with our own names and units, or as it is where it tells none.
+        """Return a table with our own names and units, or as it is where it names none.
 
         Raises UserError where a chosen column is not there or units differ, DemonstrationError,
         with the line, for a time that is none.
@@ -63,8 +63,8 @@ class Mapped:
         rows = table.rows if first is None else chain([first], table.rows)
         length = choices.length or next(iter(self._units(columns, PLACE)), "")
         time = self._time(columns, first)
-        told = {"time", "x", "y"} <= columns.keys() and length and time
-        if not told and not asked:
+        complete = {"time", "x", "y"} <= columns.keys() and length and time
+        if not complete and not asked:
             if {"time", "x", "y"} <= columns.keys() and not own & set(OWN.values()):
                 raise DemonstrationError(_no_units(where, columns, length, time))
             return table._replace(rows=rows)
