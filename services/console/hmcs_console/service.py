@@ -37,7 +37,9 @@ from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.marking import Marking, pressed
 from hmcs_console.seeing.models import Models, load_models, task_of
 from hmcs_console.seeing.presence import Presence
+from hmcs_console.seeing.reports import Reports
 from hmcs_console.seeing.seen import Picture, Seen
+from hmcs_console.seeing.shelf import Shelf
 from hmcs_console.serving.encryption import encryption
 from hmcs_console.serving.gateway import Gateway, Served
 from hmcs_console.serving.hands import FLOOD, Hands
@@ -82,7 +84,7 @@ class Console(Service):
         self.recordings = Recordings(
             self._asking,
             bus.keys,
-            lambda: first_of("recorder", self._seen.members),
+            lambda service: first_of(service, self._seen.members),
             lambda act: self.page.put(act),
         )
         """What is shown of recordings, and how their labels are set."""
@@ -94,9 +96,15 @@ class Console(Service):
         # A trainer finds a task by the console's setting, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
-        self._view = View(known, task, taught, self, settings.lease_s, log)
+        self._view = View(known, Shelf(settings.models), task, taught, self, settings.lease_s, log)
         try:
-            self._gateway = Gateway(served(settings), self.page.server, log, self._count_refused)
+            self._gateway = Gateway(
+                served(settings),
+                self.page.server,
+                log,
+                self._count_refused,
+                Reports(settings.models),
+            )
         except BaseException:
             self.page.close()
             self._asking.close()
