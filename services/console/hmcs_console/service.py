@@ -28,6 +28,7 @@ from hmcs.recognizer_takeover import Question
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.describing import Describing
+from hmcs_console.fetching import Fetching
 from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
@@ -59,6 +60,7 @@ than a few of these counts as let go."""
 _EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
 DESCRIBE_EVERY_S = 1.0
+FETCH_EVERY_S = 0.5
 WATCH_EVERY_S = 0.1
 """How often is looked at how a newcomer among the recognizers does."""
 UNWATCHED_EVERY_S = 1.0
@@ -96,6 +98,7 @@ class Console(Service):
         # A trainer finds a task by the console's setting, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
+        self._fetching = Fetching(self._asking, self._seen, known)
         self._view = View(known, Shelf(settings.models), task, taught, self, settings.lease_s, log)
         try:
             self._gateway = Gateway(
@@ -125,6 +128,7 @@ class Console(Service):
         bus.every(EVERY_S, lambda: seen.write_down(time.monotonic()))
         bus.every(HEALTH_EVERY_S, self._ask_health)
         bus.every(DESCRIBE_EVERY_S, self._describing.ask)
+        bus.every(FETCH_EVERY_S, self._fetching.ask)
         bus.every(WATCH_EVERY_S, self._swapping.watch)
         self.log.info("page", extra={"url": self.url})
 

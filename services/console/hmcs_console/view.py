@@ -58,7 +58,7 @@ class View:
         self._scene = Scene(server, log)
         self._path = TakePath(server.scene, np.array(start_m))
         self._panel = Panel(server.gui, requests, states, taught)
-        self._explained = Explained(server.gui, self._panel.operating, self._panel.rules)
+        self._explained = Explained(server.gui, self._panel.operating, self._panel.rules, task)
         self._operators = Operators(server, self._panel.operating, self._take_over)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)

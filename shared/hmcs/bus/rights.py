@@ -211,6 +211,7 @@ def _table(keys: Keys, instance: str) -> dict[str, Rights]:
                 ("robot", STOP),
                 ("fixture_controller", ACTIVATE),
                 ("fixture_controller", LOAD_MODEL),
+                ("fixture_controller", MODEL_FILE),
                 ("recognizer", LOAD_MODEL),
                 ("recorder", RECORD),
                 ("recorder", OUTLINE),
