@@ -106,6 +106,7 @@ def test_a_model_finds_the_parts_of_a_recording_beside_its_labels_and_its_report
     viewer.choose("Recording", "take-1.mcap")
     viewer.until(lambda: viewer.sees(re.compile("Learned from it:")))
     assert strips.count() == 0
+    viewer.page.get_by_role("link", name="report").scroll_into_view_if_needed()
     viewer.keep_picture("learned-from-it")
     with viewer.page.context.expect_page() as opened:
         viewer.page.get_by_role("link", name="report").click()
@@ -115,3 +116,7 @@ def test_a_model_finds_the_parts_of_a_recording_beside_its_labels_and_its_report
     assert report.locator("h1").text_content() == "Model first"
     assert report.locator("svg").count() == 2
     report.screenshot(path=PICTURES / "report.png", full_page=True)
+    report.close()
+    viewer.open_tab("Task")
+    viewer.until(lambda: viewer.sees("lesson"))
+    viewer.keep_picture("task-without-a-model")

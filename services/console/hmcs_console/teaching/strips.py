@@ -32,7 +32,7 @@ _SVG = (
 )
 _KEY = '<span style="white-space:nowrap;margin-right:0.8em">{} {}</span>'
 _SQUARE = '<span style="display:inline-block;width:0.8em;height:0.8em;border-radius:2px;{}"></span>'
-_HATCHED = f"background:repeating-linear-gradient(45deg,{UNKNOWN_COLOR} 0 2px,{_EMPTY} 2px 5px)"
+_HATCHED = f"background:repeating-linear-gradient(135deg,{UNKNOWN_COLOR} 0 2px,{_EMPTY} 2px 5px)"
 
 
 def strips(take: Take, found: Found, states: Sequence[str]) -> str:
