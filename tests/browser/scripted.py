@@ -18,6 +18,7 @@ from support.stack import Stack
 
 TELL_S = 0.02
 LET_GO_S = 0.1
+"""So long handle and pedal are up before they are held and pressed again."""
 LONGEST_PRESS_S = 30.0
 BEHIND_S = 0.08
 """The hand follows its handle so much later."""
@@ -60,11 +61,13 @@ class Scripted:
         # Taken hold of in the same moment it would not be seen to have been let go.
         self._stack.elapse(LET_GO_S)
         first, begins, turns = len(self.steps), list[int](), [0.0, *ends_s[:-1] + BEHIND_S]
-        began_s, marked, pedal = time.monotonic(), self._marks, False
+        began_s, marked, pedal, down_s = time.monotonic(), self._marks, False, -LET_GO_S
         while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S or pedal:
             assert at_s < ends_s[-1] + LONGEST_PRESS_S, "the pedal marks nothing"
+            down_s = at_s if pedal else down_s
             pedal = mark and self._marks - marked < len(begins)
-            if not pedal and len(begins) < len(turns) and at_s >= turns[len(begins)]:
+            up = not pedal and at_s - down_s >= LET_GO_S
+            if up and len(begins) < len(turns) and at_s >= turns[len(begins)]:
                 begins.append(self._next)
                 pedal = mark
             share = [np.interp(at_s, [0.0, *ends_s], axis) for axis in corners.T]
