@@ -21,6 +21,7 @@ _CUT = "…"
 _MOST_MARKS = 3
 """Marks that one letter may bear: a pile of them covers the lines above and below."""
 _COLOR = re.compile("#[0-9a-fA-F]{6}")
+_ADDRESS = re.compile("(/[A-Za-z0-9._-]{1,80}){1,8}")
 _WORD_JOINER = "\u2060"
 # Markdown makes a link of each of them in running text, even where it was written as entities.
 _LINK = re.compile(r"https?(?=://)|www(?=\.)|@", re.IGNORECASE)
@@ -90,6 +91,18 @@ def colored_dot(color: str) -> Markdown:
     if not _COLOR.fullmatch(color):
         raise ValueError(f"{color!r}: expected a color as #rrggbb")
     return Markdown(f'<span style="color:{color.lower()}">●</span>')
+
+
+def linked(text: str, address: str) -> Markdown:
+    """Return a text that leads to an address of the same server, in a window of its own.
+
+    ValueError for anything but a path of letters, digits, `/`, `.`, `_` and `-`.
+    """
+    if not _ADDRESS.fullmatch(address):
+        raise ValueError(f"{address!r}: expected a path, e.g. /reports/first.html")
+    return Markdown(
+        f'<a href="{address}" target="_blank" rel="noopener noreferrer">{as_markdown(text)}</a>'
+    )
 
 
 class _Escaping(string.Formatter):

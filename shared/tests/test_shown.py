@@ -8,7 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmcs.shown import LONGEST, Markdown, as_figure, as_html, as_markdown, colored_dot, plain
+from hmcs.shown import (
+    LONGEST,
+    Markdown,
+    as_figure,
+    as_html,
+    as_markdown,
+    colored_dot,
+    linked,
+    plain,
+)
 
 TEXTS = st.text(st.characters(exclude_categories=()), max_size=40)
 JOINER = "\u2060"
@@ -141,3 +150,13 @@ def test_a_dot_has_a_color_and_nothing_else_gets_into_its_markup() -> None:
     for color in ('#000000"><script>', "red", "#00000", "#0000000", ""):
         with pytest.raises(ValueError, match="expected a color as #rrggbb"):
             colored_dot(color)
+
+
+def test_a_link_leads_to_an_own_address_alone_and_its_text_is_read() -> None:
+    link = linked("a *b* www.x", "/reports/first_2.html")
+    assert link.startswith('<a href="/reports/first_2.html" target="_blank" rel="noopener ')
+    assert "&#42;b&#42;" in link
+    assert Markdown("{}").format(link) == link
+    for address in ("//evil.example", "https://x", "reports/x", "/a b", '/a"', "/a/", "/%2e", ""):
+        with pytest.raises(ValueError, match="expected a path"):
+            linked("x", address)

@@ -6,8 +6,6 @@ tells what the page would tell of its handle.
 
 from __future__ import annotations
 
-import time
-from bisect import bisect_right
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,11 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import NDArray
 
+from browser.scripted import Scripted
 from browser.viewing import Cell, Viewer
-from hmcs.bus.messages import Belief, FixtureState, Handle, Step
-from hmcs.bus.session import Received
+from hmcs.bus.messages import Belief, FixtureState
 from support.stack import CELL, Stack
 
 pytestmark = pytest.mark.browser
@@ -44,56 +41,11 @@ TASK = {
         "tool_orientation_xyzw": [0.0, 0.7071067811865476, 0.0, 0.7071067811865476],
     },
 }
-CORNERS_M = np.array([[0.0, 0.0, 0.0], [0.0, -0.35, 0.0], [0.0, -0.35, 0.35], [0.0, 0.0, 0.0]])
+CORNERS_M = np.array([[0.6, 0.1, 0.4], [0.6, -0.25, 0.4], [0.6, -0.25, 0.75], [0.6, 0.1, 0.4]])
 SPEED_M_S = 0.3
-TELL_S = 0.02
-PRESSED_S = 0.1
-"""So long a pedal is down."""
-BEHIND_S = 0.08
-"""The hand follows its handle so much later."""
 RECOGNIZED = 0.95
 DEMONSTRATIONS = 3
 TRAINED_S = 120.0
-
-
-class Scripted:
-    """Whoever holds the handle: goes round once, and presses the pedal where a part begins."""
-
-    def __init__(self, cell: Cell) -> None:
-        self._cell, bus = cell, cell.bus
-        self._handles = bus.publisher(Handle, bus.keys.handle)
-        self.steps: list[Received[Step]] = []
-        bus.subscribe(Step, bus.keys.step, self.steps.append)
-
-    def perform(self, rng: np.random.Generator, *, mark: bool) -> dict[int, str]:
-        """Go round once; return the state that is meant at each step."""
-        corners = CORNERS_M * rng.uniform(0.95, 1.05) + np.array([0.6, 0.1, 0.4])
-        sides_m = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-        ends_s = np.cumsum(sides_m) / SPEED_M_S
-        self._tell(corners[0], held=False)
-        # Taken hold of in the same moment it would not be seen to have been let go.
-        self._cell.stack.elapse(PRESSED_S)
-        first, begins, turns = len(self.steps), [], [0.0, *ends_s[:-1] + BEHIND_S]
-        began_s, pedal_until_s = time.monotonic(), 0.0
-        while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S:
-            while len(begins) < len(STATES) and at_s >= turns[len(begins)]:
-                begins.append(self._next)
-                pedal_until_s = at_s + PRESSED_S if mark else 0.0
-            share = [np.interp(at_s, [0.0, *ends_s], axis) for axis in corners.T]
-            self._tell(np.array(share), held=True, pedal=at_s < pedal_until_s)
-            self._cell.stack.elapse(TELL_S)
-        self._tell(corners[-1], held=False)
-        # What has been made meanwhile is still on its way.
-        self._cell.stack.elapse(0.2)
-        made = [step.body.index for step in self.steps[first:]]
-        return {index: STATES[bisect_right(begins, index) - 1] for index in made}
-
-    @property
-    def _next(self) -> int:
-        return self.steps[-1].body.index + 1 if self.steps else 0
-
-    def _tell(self, position: NDArray[np.float64], *, held: bool, pedal: bool = False) -> None:
-        self._handles.put(Handle(operator="script", position=position, dead_man=held, pedal=pedal))
 
 
 def start(stack: Stack, task: Path, folder: Path) -> Cell:
@@ -123,7 +75,8 @@ def test_what_is_shown_three_times_is_recognized_the_fourth(
     task.write_text(yaml.safe_dump(TASK), encoding="utf-8")
     cell = start(stack, task, tmp_path / "taught")
     viewer = open_viewer(cell, task=task)
-    hand, rng = Scripted(cell), np.random.default_rng(7)
+    hand = Scripted(cell.stack, CORNERS_M, STATES, SPEED_M_S)
+    rng = np.random.default_rng(7)
     beliefs: dict[int, Belief] = {}
     followed: list[str] = []
     cell.bus.subscribe(

@@ -23,6 +23,8 @@ from hmcs.bus.messages import (
     Record,
     Refusal,
     RobotDescription,
+    Segmentation,
+    SegmentQuestion,
     SetLabels,
     SettingsReport,
     Step,
@@ -33,7 +35,7 @@ from hmcs.bus.qos import QOS_PROFILES, QosProfile
 BY_QUERY = {
     Ask, Refusal, Health, Description, SettingsReport, LastStepsQuestion, LastSteps, LoadModel,
     ModelQuestion, ModelFile, ActivateRecognizer, RobotDescription, Record, Train, OutlineQuestion,
-    Outline, SetLabels, ChangeRecording, Done,
+    Outline, SetLabels, ChangeRecording, SegmentQuestion, Segmentation, Done,
 }  # fmt: skip
 
 

@@ -65,14 +65,19 @@ class Behind:
 class Door:
     """A gateway, and what it says."""
 
-    def __init__(self, behind: Behind, served: Served) -> None:
+    def __init__(
+        self,
+        behind: Behind,
+        served: Served,
+        reports: Callable[[str], bytes | None] = lambda _: None,
+    ) -> None:
         self.log = logging.Logger("door")
         self.lines: list[logging.LogRecord] = []
         handler = logging.Handler()
         handler.emit = self.lines.append  # type: ignore[method-assign]
         self.log.addHandler(handler)
         self.refused: list[str] = []
-        self.gateway = Gateway(served, behind, self.log, self.refused.append)
+        self.gateway = Gateway(served, behind, self.log, self.refused.append, reports)
         self.port = self.gateway.port
 
     def page(self, **settings: Any) -> Any:

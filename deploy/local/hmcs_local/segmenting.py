@@ -10,11 +10,10 @@ from rich.console import Console
 
 from hmcs.errors import UserError
 from hmcs.motion.demonstrations import Demonstration
-from hmcs.motion.steps import sampled_steps
+from hmcs.recognition.demonstration_parts import parts_of
 from hmcs.recognition.model import Model
 from hmcs.recognition.model_file import load_model
 from hmcs.recognition.registry import segmentation_of
-from hmcs.recognition.segmentation import label_of
 from hmcs.recordings.csv_labels import write_csv_labels
 from hmcs.recordings.demonstrations import stretches_of
 from hmcs.recordings.foreign.choices import AS_IT_IS, Choices
@@ -88,23 +87,14 @@ def segment_files(
 
 def segmented(model: Model, demonstration: Demonstration, *, anywhere: bool) -> Segmented:
     """Return the segments of a whole demonstration; labels that it has do not count."""
-    sampled = list(sampled_steps(demonstration, model.task.dead_zone_m))
-    found = segmentation_of(model, [each.step for each in sampled], anywhere=anywhere)
     states: list[str | None] = [None] * len(demonstration.positions)
     rows, short = [], 0
-    for segment in found:
-        label = label_of(model.task, segment)
-        begin = sampled[segment.start].begin
-        end = sampled[segment.stop - 1].end
-        if segment.stop == len(sampled):
-            end = len(states) - 1
-        if segment.stop - segment.start >= LEAST_STEPS:
-            states[begin : end + 1] = [label] * (end + 1 - begin)
-        else:
-            short += label is not None
-            states[begin : end + 1] = [None] * (end + 1 - begin)
+    for label, begin, end, steps, probability in parts_of(model, demonstration, anywhere=anywhere):
+        kept = label if steps >= LEAST_STEPS else None
+        short += kept != label
+        states[begin : end + 1] = [kept] * (end + 1 - begin)
         begin_s, end_s = (f"{demonstration.time_s[sample]:.3f}" for sample in (begin, end))
-        rows.append((label or UNKNOWN, begin_s, end_s, f"{segment.probability:.3f}"))
+        rows.append((label or UNKNOWN, begin_s, end_s, f"{probability:.3f}"))
     return Segmented(tuple(rows), demonstration._replace(states=tuple(states)), short)
 
 

@@ -28,6 +28,7 @@ from hmcs.recognizer_takeover import Question
 from hmcs.task import Task
 from hmcs_console.asking import Asking, first_of
 from hmcs_console.describing import Describing
+from hmcs_console.fetching import Fetching
 from hmcs_console.operating.handles import Stopped
 from hmcs_console.operating.stopping import Stopping
 from hmcs_console.order import order_of
@@ -37,7 +38,9 @@ from hmcs_console.seeing.listening import Listening
 from hmcs_console.seeing.marking import Marking, pressed
 from hmcs_console.seeing.models import Models, load_models, task_of
 from hmcs_console.seeing.presence import Presence
+from hmcs_console.seeing.reports import Reports
 from hmcs_console.seeing.seen import Picture, Seen
+from hmcs_console.seeing.shelf import Shelf
 from hmcs_console.serving.encryption import encryption
 from hmcs_console.serving.gateway import Gateway, Served
 from hmcs_console.serving.hands import FLOOD, Hands
@@ -57,6 +60,7 @@ than a few of these counts as let go."""
 _EVERYBODY = Member(ANY, ANY)
 HEALTH_EVERY_S = 2.0
 DESCRIBE_EVERY_S = 1.0
+FETCH_EVERY_S = 0.5
 WATCH_EVERY_S = 0.1
 """How often is looked at how a newcomer among the recognizers does."""
 UNWATCHED_EVERY_S = 1.0
@@ -82,7 +86,7 @@ class Console(Service):
         self.recordings = Recordings(
             self._asking,
             bus.keys,
-            lambda: first_of("recorder", self._seen.members),
+            lambda service: first_of(service, self._seen.members),
             lambda act: self.page.put(act),
         )
         """What is shown of recordings, and how their labels are set."""
@@ -94,9 +98,16 @@ class Console(Service):
         # A trainer finds a task by the console's setting, a file's path or a shipped name.
         taught = settings.task or ("" if task is None else task.name)
         known = Models(models, settings.models, log)
-        self._view = View(known, task, taught, self, settings.lease_s, log)
+        self._fetching = Fetching(self._asking, self._seen, known)
+        self._view = View(known, Shelf(settings.models), task, taught, self, settings.lease_s, log)
         try:
-            self._gateway = Gateway(served(settings), self.page.server, log, self._count_refused)
+            self._gateway = Gateway(
+                served(settings),
+                self.page.server,
+                log,
+                self._count_refused,
+                Reports(settings.models),
+            )
         except BaseException:
             self.page.close()
             self._asking.close()
@@ -117,6 +128,7 @@ class Console(Service):
         bus.every(EVERY_S, lambda: seen.write_down(time.monotonic()))
         bus.every(HEALTH_EVERY_S, self._ask_health)
         bus.every(DESCRIBE_EVERY_S, self._describing.ask)
+        bus.every(FETCH_EVERY_S, self._fetching.ask)
         bus.every(WATCH_EVERY_S, self._swapping.watch)
         self.log.info("page", extra={"url": self.url})
 

@@ -15,6 +15,7 @@ from hmcs_console.drawing.surroundings import draw_ground, draw_workspace
 from hmcs_console.operating.handles import TookOver
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Picture
+from hmcs_console.seeing.shelf import Shelf, active_first
 from hmcs_console.serving.page import Page
 from hmcs_console.teaching.timeline import TakePath
 from hmcs_console.telling.explained import Explained
@@ -33,6 +34,7 @@ class View:
     def __init__(
         self,
         models: Models,
+        shelf: Shelf,
         task: Task | None,
         taught: str,
         requests: Requests,
@@ -51,11 +53,12 @@ class View:
         if task is not None:
             draw_workspace(server.scene, task.workspace)
         self._models = models
+        self._shelf = shelf
         self._training: TrainingProgress | None = None
         self._scene = Scene(server, log)
         self._path = TakePath(server.scene, np.array(start_m))
         self._panel = Panel(server.gui, requests, states, taught)
-        self._explained = Explained(server.gui, self._panel.operating, self._panel.rules)
+        self._explained = Explained(server.gui, self._panel.operating, self._panel.rules, task)
         self._operators = Operators(server, self._panel.operating, self._take_over)
         self._words_s = 0.0
         self.page.serve(self._panel.operating)
@@ -72,6 +75,10 @@ class View:
         now_s = time.monotonic()
         if now_s - self._words_s >= WORDS_EVERY_S:
             self._words_s = now_s
+            belief = picture.belief
+            its_hash = "" if belief is None else belief.model_hash
+            known = active_first(self._shelf.look(), picture.active, its_hash)
+            picture = picture._replace(models=known)
             with server.atomic():
                 self._panel.draw(picture)
                 self._operators.draw(picture)

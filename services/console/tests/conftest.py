@@ -245,8 +245,12 @@ def behind() -> Iterator[Behind]:
 def make_door(behind: Behind) -> Iterator[Callable[..., Door]]:
     with ExitStack() as stack:
 
-        def make(**settings: Any) -> Door:
-            door = Door(behind, Served(**({"host": "127.0.0.1", "port": 0} | settings)))
+        def make(reports: Callable[[str], bytes | None] = lambda _: None, **settings: Any) -> Door:
+            door = Door(
+                behind,
+                reports=reports,
+                served=Served(**({"host": "127.0.0.1", "port": 0} | settings)),
+            )
             stack.callback(door.gateway.close)
             return door
 

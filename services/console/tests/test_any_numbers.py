@@ -29,6 +29,7 @@ from hmcs.recognition.model_file import load_model
 from hmcs_console.seeing.listening import wrong_with
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Seen
+from hmcs_console.seeing.shelf import Shelf
 from hmcs_console.seeing.step_evidence import usable
 from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.view import View
@@ -89,7 +90,7 @@ class Nobody(SimpleNamespace):
 
 @pytest.fixture
 def view(model_file: Any) -> Iterator[View]:
-    made = View(Models((load_model(model_file),), (), LOG), None, "", Nobody(), 1.0, LOG)
+    made = View(Models((load_model(model_file),), (), LOG), Shelf(()), None, "", Nobody(), 1.0, LOG)
     yield made
     made.page.close()
 

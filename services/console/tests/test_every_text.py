@@ -10,6 +10,7 @@ import dataclasses
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping
+from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from hmcs.bus.messages import (
     Refusal,
     RobotDescription,
     RobotState,
+    Segmentation,
     TrainingProgress,
 )
 from hmcs.errors import UserError
@@ -37,10 +39,12 @@ from hmcs.recognition.model_file import load_model
 from hmcs.shown import plain
 from hmcs_console.operating import stopping
 from hmcs_console.order import Order
+from hmcs_console.seeing.found import with_found
 from hmcs_console.seeing.listening import wrong_with
 from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.models import Models
 from hmcs_console.seeing.seen import Seen
+from hmcs_console.seeing.shelf import Shelf
 from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.serving.page import Page
 from hmcs_console.teaching import takeover
@@ -92,6 +96,14 @@ def keep_take(seen: Seen, outline: Outline) -> None:
         seen.take = Take(said=str(error))  # type: ignore[attr-defined]
 
 
+def keep_found(seen: Seen, said: Segmentation) -> None:
+    take = opened(Take(), EXAMPLE_OF[Outline])  # type: ignore[arg-type]
+    try:
+        seen.take = with_found(take, said)  # type: ignore[attr-defined]
+    except UserError as error:
+        seen.take = take._replace(said=str(error))  # type: ignore[attr-defined]
+
+
 def keep_training(seen: Seen, training: TrainingProgress) -> None:
     seen.training = training
     begun = takeover.begun(training, ACTIVE).takeover
@@ -125,6 +137,7 @@ KEPT: Mapping[type[Message], Keep] = {
     Refusal: set_to("answer", lambda body: f"robot refused: {body.reason}"),
     RobotDescription: set_to("looks"),
     Outline: keep_take,
+    Segmentation: keep_found,
     Label: set_to("marking", lambda body: Marking(Order("a", {}), True, body.state)),
 }
 NOT_SHOWN = {
@@ -136,6 +149,7 @@ NOT_SHOWN = {
         "OutlineQuestion",
         "SetLabels",
         "ChangeRecording",
+        "SegmentQuestion",
         "Pairing",
         "StopRequest",
     ),
@@ -161,6 +175,8 @@ READ = {
     ("Outline", ("recordings", 0)),
     ("Outline", ("states", 0)),
     ("Label", ("state",)),
+    ("Segmentation", ("model",)),
+    ("Segmentation", ("states", 0)),
 }
 """Fields whose text a person reads on the page."""
 
@@ -184,7 +200,7 @@ class Sent:
             def __getattr__(self, _: str) -> Callable[..., None]:
                 return lambda *_: None
 
-        self.view = View(models, None, "", Nobody(), 1.0, LOG)
+        self.view = View(models, Shelf(()), None, "", Nobody(), 1.0, LOG)
         self.messages: list[Any] = []
         sender = self.view.page.server._websock_server
         inner = sender.queue_message
@@ -266,6 +282,34 @@ def read(markdown: str) -> str:
     return text.replace(JOINER, "")
 
 
+DRAWN = {
+    *("svg", "defs", "pattern", "rect", "text", "path", "title", "div", "span"),
+}
+DRAWN_BY = re.compile(r"[\w .,:;#()%/-]*")
+"""What attributes of a drawing say; an address leads to the drawing itself."""
+
+
+class Drawing(HTMLParser):
+    """What a person reads of a drawing; fails where it is more than shapes and words."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag in DRAWN, tag
+        for name, value in attrs:
+            assert not name.startswith("on"), name
+            assert name not in ("href", "src", "xlink:href"), name
+            assert DRAWN_BY.fullmatch(value or ""), (name, value)
+            assert re.sub(r"url\(#[\w-]+\)", "", value or "").count("url") == 0
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
 def is_harmless(name: str, text: str) -> bool:
     if name == "name":
         return NODE.fullmatch(text) is not None
@@ -279,9 +323,10 @@ def look_at(sent: Sent, what: str) -> str:
         if name == "_markdown":
             reported.append(read(text))
             assert len(text) < 20_000, what
+        elif name == "content":
+            reported += Drawing(text).words
         else:
             assert is_harmless(name, text), (what, name, text)
-            assert name != "content", (what, text)
             reported.append(text)
     return "\n".join(reported)
 

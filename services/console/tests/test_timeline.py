@@ -260,7 +260,7 @@ def test_without_a_recorder_the_page_says_what_is_missing(make_cell: Callable[..
 # --- the controls ---------------------------------------------------------------------------------
 
 
-MANAGING = ("play", "rename", "delete", "note")
+MANAGING = ("play", "rename", "delete", "note", "segment")
 
 
 class Asked(SimpleNamespace):

@@ -66,9 +66,11 @@ def job_of(asked: Train, folder: Path, sources: Sequence[Path]) -> Job:
     shipped = asked.task in shipped_tasks()
     return Job(
         name=asked.model,
-        task=asked.task if shipped else str(_own(asked.task, places, "a task", TASKS)),
+        task=asked.task if shipped else str(own_file(asked.task, places, "a task", TASKS)),
         demonstrations=tuple(
-            name if is_drawing(name) else str(_own(name, places, "a demonstration", DEMONSTRATIONS))
+            name
+            if is_drawing(name)
+            else str(own_file(name, places, "a demonstration", DEMONSTRATIONS))
             for name in asked.demonstrations
         ),
         recognizer=kind.name,
@@ -78,8 +80,11 @@ def job_of(asked: Train, folder: Path, sources: Sequence[Path]) -> Job:
     )
 
 
-def _own(name: str, places: Sequence[Path], what: str, endings: Sequence[str]) -> Path:
-    """Return the file of that name, which lies in one of the places, links followed."""
+def own_file(name: str, places: Sequence[Path], what: str, endings: Sequence[str]) -> Path:
+    """Return the file of that name, which lies in one of the places, links followed.
+
+    Raises RequestRefusedError where it has none of the endings, or there is none.
+    """
     shown = f"{name!r:.200}"
     if len(name) > LONGEST_NAME or not name.endswith(tuple(endings)):
         raise RequestRefusedError(

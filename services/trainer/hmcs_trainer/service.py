@@ -1,17 +1,22 @@
-"""The service: trains when asked, in a process of its own, and reports how far it is."""
+"""The service: trains when asked, in a process of its own, and reports how far it is.
+
+It also finds the parts of a recording by a model, in a process of its own as well.
+"""
 
 from __future__ import annotations
 
 import logging
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-from hmcs.bus.messages import Ask, Done, Train, TrainingProgress
+from hmcs.bus.messages import Ask, Done, ModelFile, ModelQuestion, Train, TrainingProgress
 from hmcs.bus.service import Service
 from hmcs.bus.session import Bus, Received, RequestRefusedError
-from hmcs.bus.verbs import CANCEL, TRAIN
+from hmcs.bus.verbs import CANCEL, MODEL_FILE, SEGMENT, TRAIN
 from hmcs_trainer.asked import job_of
 from hmcs_trainer.running import RunningJob
+from hmcs_trainer.segmenting import Segmenting
 from hmcs_trainer.settings import TrainerSettings
 
 TOLD_EVERY_S = 0.1
@@ -21,6 +26,7 @@ FORGOTTEN_AFTER_S = 10.0
 """A trainer that has published no progress for so long counts as idle."""
 MOST_ELSEWHERE = 64
 """The progress of so many other trainers is remembered at most."""
+FETCHED_WITHIN_S = 5.0
 _ENDED = ("done", "failed", "canceled")
 
 
@@ -43,11 +49,17 @@ class Trainer(Service):
         self._elsewhere: dict[str, _Elsewhere] = {}
         self._last = "nothing was trained yet"
         self._progress = bus.publisher(TrainingProgress, bus.keys.training)
+        # A second one, to refuse who asks meanwhile.
+        self._aside = ThreadPoolExecutor(2, thread_name_prefix="segmenting")
+        self._segmenting = Segmenting(
+            settings.folder, settings.sources, settings.segment_longest_s, self._model_file, log
+        )
 
     def start(self) -> None:
         """Wait to be asked."""
         TRAIN.answer(self.bus, self._train)
         CANCEL.answer(self.bus, self._cancel)
+        SEGMENT.answer(self.bus, self._segmenting.segmentation, aside=self._aside)
         self.bus.subscribe(TrainingProgress, self.bus.keys.training, self._on_progress)
         self.bus.watch(self.bus.keys.presence(self.name), self._on_trainer)
         self.bus.every(TOLD_EVERY_S, self._look)
@@ -63,7 +75,9 @@ class Trainer(Service):
         return {"folder": str(self.settings.folder.resolve()), "sources": sources}
 
     def close(self) -> None:
-        """End what is being trained; no half-written model stays."""
+        """End what is being trained or segmented; no half-written model stays."""
+        self._segmenting.close()
+        self._aside.shutdown(wait=False, cancel_futures=True)
         if self._running is not None:
             self._running.cancel(self.settings.stop_grace_s)
 
@@ -99,6 +113,11 @@ class Trainer(Service):
         self._tell("canceled", "canceled; no model was written", self._running.share)
         self._end(f"{model}: canceled")
         return Done(detail=f"canceled {model}")
+
+    def _model_file(self, name: str) -> ModelFile | None:
+        question = ModelQuestion(model=name)
+        answers = MODEL_FILE.ask(self.bus, question, timeout_s=FETCHED_WITHIN_S)
+        return answers[0].body if answers else None
 
     def _on_progress(self, received: Received[TrainingProgress]) -> None:
         """Keep what other trainers are at."""

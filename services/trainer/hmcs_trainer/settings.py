@@ -19,5 +19,7 @@ class TrainerSettings(ServiceSettings):
     may lie in. No other file is read for a question from the bus."""
     longest_s: float = Field(default=3600.0, gt=0.0)
     """A training that takes longer is given up."""
+    segment_longest_s: float = Field(default=20.0, gt=0.0)
+    """Finding the parts of a recording is given up when it takes longer."""
     stop_grace_s: float = Field(default=2.0, gt=0.0)
     """A training that is canceled has so long to end by itself."""

@@ -37,6 +37,8 @@ from hmcs.bus.messages import (
     Refusal,
     RobotDescription,
     RobotState,
+    Segmentation,
+    SegmentQuestion,
     SetLabels,
     SettingsReport,
     Step,
@@ -92,6 +94,8 @@ BOUNDS: dict[type[Message], Bound] = {
     Outline: Bound(16 * MIB, 100_000, "A path of 100 000 points, and the names of all recordings."),
     ChangeRecording: Bound(16 * KIB, 64, "Two names, or a name and a note."),
     SetLabels: Bound(MIB, 20_000, "Labels of a long recording, two numbers and a name each."),
+    SegmentQuestion: Bound(8 * KIB, 64, "A path, a name and a hash."),
+    Segmentation: Bound(MIB, 20_000, "2000 segments, three numbers and a name each."),
     Done: Bound(64 * KIB, 64, "A sentence."),
 }  # fmt: skip
 """The bound of every message."""

@@ -33,6 +33,8 @@ from hmcs.bus.messages import (
     Refusal,
     RobotDescription,
     RobotState,
+    Segmentation,
+    SegmentQuestion,
     SetLabels,
     SettingsReport,
     Source,
@@ -217,6 +219,17 @@ EXAMPLES: tuple[Message, ...] = (
         states=("follow", "return"),
     ),
     ChangeRecording(recording="take-1.mcap", change="rename", text="slow-1"),
+    SegmentQuestion(
+        recording="out/recordings/take-1.mcap", model="demo", model_hash="0123456789abcdef"
+    ),
+    Segmentation(
+        recording="take-1.mcap",
+        model="demo",
+        begin_s=np.array([0.25, 0.5]),
+        end_s=np.array([0.5, 1.0]),
+        states=("follow", ""),
+        probability=np.array([0.9375, 0.5]),
+    ),
     Done(detail="following demo"),
 )
 """One of each, every optional field filled."""

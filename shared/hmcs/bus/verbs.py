@@ -29,6 +29,8 @@ from hmcs.bus.messages import (
     OutlineQuestion,
     Record,
     RobotDescription,
+    Segmentation,
+    SegmentQuestion,
     SetLabels,
     SettingsReport,
     Train,
@@ -108,6 +110,13 @@ CHANGE_RECORDING = Verb(
 )
 TRAIN = Verb("train", ("trainer",), Train, Done, "learns a model")
 CANCEL = Verb("cancel", ("trainer",), Ask, Done, "ends the training that runs")
+SEGMENT = Verb(
+    "segment",
+    ("trainer",),
+    SegmentQuestion,
+    Segmentation,
+    "the parts of the task in a recording, found afterwards by a model",
+)
 
 VERBS: tuple[Verb, ...] = (  # type: ignore[type-arg]
     HEALTH,
@@ -126,6 +135,7 @@ VERBS: tuple[Verb, ...] = (  # type: ignore[type-arg]
     CHANGE_RECORDING,
     TRAIN,
     CANCEL,
+    SEGMENT,
 )
 """Every verb there is."""
 

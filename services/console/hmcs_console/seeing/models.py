@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -24,6 +25,7 @@ from hmcs_console.shapes.geometry import Surface, tube
 
 MOST_MODELS, MOST_TOLD, MOST_MISSED = 256, 16, 256
 """Models that are kept, files that others named, and hashes of which no file was found."""
+_MOST_GIVEN = 2
 READ_EVERY_S = 2.0
 """How often files are looked at for a model that is not known."""
 _LONGEST_PATH = 4096
@@ -104,7 +106,11 @@ class Models:
         self._places = tuple(places)
         self._named_files: deque[Path] = deque(maxlen=MOST_TOLD)
         self._missed: deque[str] = deque(maxlen=MOST_MISSED)
+        self._given: deque[bytes] = deque(maxlen=_MOST_GIVEN)
         self._read_s = -READ_EVERY_S
+        self.wanted: tuple[str, str] | None = None
+        """Name and hash of the model that is followed and not known here; the hash is empty as
+        long as nobody has reported one."""
 
     def look_in(self, path: str) -> None:
         """Look in a file, too, which somebody says was written just now."""
@@ -112,12 +118,23 @@ class Models:
             self._named_files.append(Path(path))
             self._missed.clear()
 
+    def give(self, content: bytes) -> None:
+        """Take in the file of a model that is wanted, from wherever it came; on any thread."""
+        self._given.append(content)
+
     def find(self, recognizer: str, model_hash: str) -> Model | None:
         """Return the model a recognizer stands on, by its hash; None where it is not known here.
 
         A recognizer of another name may stand on any model, so its name counts only as long as it
         has reported no hash, which is empty then.
         """
+        while self._given:
+            self._take_given(self._given.popleft())
+        known = self._known(recognizer, model_hash)
+        self.wanted = None if known is not None or not recognizer else (recognizer, model_hash)
+        return known
+
+    def _known(self, recognizer: str, model_hash: str) -> Model | None:
         if not model_hash:
             return self._named.get(recognizer)
         known = self._hashed.get(model_hash)
@@ -143,6 +160,16 @@ class Models:
                 for file in model_files(place):
                     with suppress(UserError, OSError, ValueError, MemoryError, RecursionError):
                         self._take(load_model(file))
+
+    def _take_given(self, content: bytes) -> None:
+        # What came is none, or too large, whoever sent it: it is not drawn.
+        with (
+            suppress(UserError, OSError, ValueError, MemoryError, RecursionError),
+            tempfile.NamedTemporaryFile(suffix=".hmcs") as file,
+        ):
+            file.write(content)
+            file.flush()
+            self._take(load_model(file.name))
 
     def _take(self, model: Model) -> None:
         if len(self._hashed) < MOST_MODELS:

@@ -25,6 +25,7 @@ from hmcs_console.seeing.history import Rows, written
 from hmcs_console.seeing.hops import FAST, SLOW, Arrivals, Cause
 from hmcs_console.seeing.marking import Marking
 from hmcs_console.seeing.runners import Runners
+from hmcs_console.seeing.shelf import Shelved
 from hmcs_console.seeing.step_evidence import StepEvidence, evidence_of, with_evidence
 from hmcs_console.seeing.takes import Take
 from hmcs_console.seeing.trails import Points, Trail
@@ -96,6 +97,8 @@ class Picture(NamedTuple):
     """Of recordings, as the recorder sees it; empty where it has not reported."""
     before: str = ""
     """Name of the recognizer that was active before; empty where none was."""
+    models: tuple[Shelved, ...] = ()
+    """That are known, the active one first."""
 
 
 class Seen:

@@ -35,6 +35,17 @@ MOST_STATES = 100
 _WHILE_S = 0.2
 
 
+class Found(NamedTuple):
+    """The parts of a recording as a model found them afterwards."""
+
+    model: str
+    """Its name."""
+    segments: tuple[Stretch, ...]
+    """One after another; without a state where the motion is unknown."""
+    probability: tuple[float, ...]
+    """Of each."""
+
+
 class Take(NamedTuple):
     """What is shown of a recording; none where `name` is empty."""
 
@@ -56,6 +67,8 @@ class Take(NamedTuple):
     """Labels that were set and not saved, by recording."""
     note: str = ""
     """What somebody wrote down about it."""
+    found: Found | None = None
+    """Its parts by a model; None as long as none was asked."""
     playing_since_s: float | None = None
     """When its playing in the scene began, monotonic; None while it is not played."""
     said: str = ""
@@ -84,6 +97,7 @@ def opened(take: Take, outline: Outline) -> Take:
         time_s=outline.time_s,
         position=outline.position,
         note=outline.note,
+        found=take.found if again else None,
         playing_since_s=take.playing_since_s if again else None,
         labels=take.unsaved.get(outline.recording, labels),
         chosen_s=_within(take.chosen_s, outline.duration_s) if again else (0.0, outline.duration_s),

@@ -10,6 +10,7 @@ from http import HTTPStatus
 
 import viser
 
+from hmcs_console.seeing.reports import HEADERS
 from hmcs_console.serving.admission import Head
 from hmcs_console.serving.document import Document
 
@@ -38,15 +39,22 @@ def answer(
 
 
 def document_for(head: Head, document: Document) -> bytes:
-    """Return the answer to a request for a document: the page, which is all there is."""
+    """Return the answer to a request for a document: the page, or that it is none."""
     if head.method != "GET":
         return answer(405, "this page is only looked at", ["Allow: GET"])
     if head.path not in ("/", "/index.html"):
-        return answer(404, "there is nothing but the page")
+        return answer(404, "there is nothing but the page, and the reports of its models")
     if "gzip" not in head.headers.get("accept-encoding", ""):
         return answer(200, headers=document.headers, body=document.body)
     headers = [*document.headers, "Content-Encoding: gzip"]
     return answer(200, headers=headers, body=document.zipped)
+
+
+def report_for(report: bytes | None) -> bytes:
+    """Return the answer to a request for the report of a training; None where there is none."""
+    if report is None:
+        return answer(404, "no model in the console's folders has a report of that name")
+    return answer(200, headers=HEADERS, body=report)
 
 
 def asks_for_socket(head: Head) -> bool:

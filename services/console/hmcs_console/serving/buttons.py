@@ -27,6 +27,7 @@ TAG, TRAIN, REFRESH, SAVE, ADD, HIDE, REMOVE = (
     viser.Icon.ERASER,
 )
 EDIT, DELETE = viser.Icon.PENCIL, viser.Icon.TRASH
+FIND = viser.Icon.TIMELINE
 HAND = viser.Icon.HAND_GRAB
 
 

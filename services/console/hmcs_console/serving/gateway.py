@@ -21,11 +21,13 @@ from typing import Any, NamedTuple, Protocol
 
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.service import UserError
+from hmcs_console.seeing.reports import asked_report
 from hmcs_console.serving.admission import Admission, Head, head_of
 from hmcs_console.serving.answers import (
     answer,
     asks_for_socket,
     document_for,
+    report_for,
     request_for_socket,
     wrong_with_socket,
 )
@@ -83,8 +85,11 @@ class Gateway:
         page: PageServer,
         log: logging.Logger,
         refused: Callable[[str], None],
+        reports: Callable[[str], bytes | None] = lambda _: None,
     ) -> None:
         """Open the door to the page; tell `refused` what is turned away, and why.
+
+        `reports` returns the report of a name, on any thread; None where there is none.
 
         Raises UserError where neither the port nor one of those after it can be listened at, and
         where others could reach a page without a token.
@@ -92,6 +97,7 @@ class Gateway:
         self._served = served
         self._page = page
         self._refused = refused
+        self._reports = reports
         self._limited = RateLimitedLog(log)
         self._document = load_document()
         self._connections: Counter[str] = Counter()
@@ -222,6 +228,9 @@ class Gateway:
             await _send(writer, answer(status, verdict.reason, verdict.headers))
         elif asks_for_socket(head):
             await self._open_page(head, reader, writer, address)
+        elif head.method == "GET" and (report := asked_report(head.path)):
+            # Reading must not hold up what operators of open pages do.
+            await _send(writer, report_for(await asyncio.to_thread(self._reports, report)))
         else:
             await _send(writer, document_for(head, self._document))
 

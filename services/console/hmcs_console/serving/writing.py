@@ -38,6 +38,18 @@ def add_words(
     return place
 
 
+def add_drawing(gui: viser.GuiApi, order: float | None = None) -> viser.GuiHtmlHandle:
+    """Return a place for a drawing, in the container that is open now; nothing is in it."""
+    return gui.add_html("", order=order, visible=False)
+
+
+def draw(place: viser.GuiHtmlHandle, drawing: str) -> None:
+    """Put a drawing down where another one stands: HTML whose texts came through `as_html`."""
+    if place.content != drawing:
+        place.content = drawing
+        place.visible = bool(drawing)
+
+
 def name_of_curve(name: str) -> str:
     """Return a name as the legend of a plot shows it."""
     return plain(name, _LONGEST_NAME)

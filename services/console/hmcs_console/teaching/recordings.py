@@ -7,12 +7,19 @@ from collections.abc import Callable
 from typing import Literal
 
 from hmcs.bus.keys import Keys, Member
-from hmcs.bus.messages import ChangeRecording, Outline, OutlineQuestion
+from hmcs.bus.messages import (
+    ChangeRecording,
+    Outline,
+    OutlineQuestion,
+    Segmentation,
+    SegmentQuestion,
+)
 from hmcs.bus.session import Answer
-from hmcs.bus.verbs import CHANGE_RECORDING, OUTLINE, SET_LABELS
+from hmcs.bus.verbs import CHANGE_RECORDING, OUTLINE, SEGMENT, SET_LABELS
 from hmcs.errors import UserError
 from hmcs_console.asking import Asking
 from hmcs_console.seeing import takes
+from hmcs_console.seeing.found import with_found
 from hmcs_console.seeing.takes import Take
 
 READ_S = 30.0
@@ -26,13 +33,16 @@ class Recordings:
         self,
         asking: Asking,
         keys: Keys,
-        recorder: Callable[[], Member | None],
+        first: Callable[[str], Member | None],
         put: Callable[[Callable[[], None]], None],
     ) -> None:
-        """Begin with none; `put` has something done on the bus' thread."""
+        """Begin with none; `put` has something done on the bus' thread.
+
+        `first` returns the process of a kind that is asked, None where none is there.
+        """
         self._asking = asking
         self._keys = keys
-        self._recorder = recorder
+        self._first = first
         self._put = put
         self._asked = 0
         self.take = Take()
@@ -72,6 +82,10 @@ class Recordings:
 
         self._put(begin)
 
+    def segment(self, model: str, model_hash: str) -> None:
+        """Have the trainer find the parts of the recording that is shown, by a model."""
+        self._put(lambda: self._segment(model, model_hash))
+
     def rename(self, name: str) -> None:
         """Have the recorder call the recording that is shown something else."""
         self._put(lambda: self._change("rename", name))
@@ -92,7 +106,7 @@ class Recordings:
 
     def list(self) -> None:
         """Have the recorder tell what recordings there are; what is shown stays as it is."""
-        member = self._recorder()
+        member = self._first("recorder")
         if member is None:
             return
 
@@ -117,7 +131,7 @@ class Recordings:
         self.take = takes.hidden(self.take)
 
     def _open(self, name: str) -> None:
-        member = self._recorder()
+        member = self._first("recorder")
         if member is None:
             self._say("no recorder is there: start one")
             return
@@ -145,8 +159,35 @@ class Recordings:
             timeout_s=READ_S,
         )
 
+    def _segment(self, model: str, model_hash: str) -> None:
+        member, name = self._first("trainer"), self.take.name
+        if not name or member is None:
+            self._say("open a recording first" if member else "no trainer is there: start one")
+            return
+        self._say(f"{model} is looking for the parts …")
+
+        def come(answers: list[Answer[Segmentation]]) -> None:
+            if self.take.name != name:
+                return
+            if not answers:
+                self._say(f"the trainer gave no answer within {READ_S:g} s")
+                return
+            try:
+                self.take = with_found(self.take, answers[0].body)
+            except UserError as error:
+                self._say(str(error))
+
+        self._asking.ask(
+            SEGMENT,
+            member,
+            SegmentQuestion(recording=self.take.path, model=model, model_hash=model_hash),
+            come,
+            lambda reason: self._say(f"the trainer refused: {reason}"),
+            timeout_s=READ_S,
+        )
+
     def _change(self, change: Literal["rename", "delete", "note"], text: str) -> None:
-        member, name = self._recorder(), self.take.name
+        member, name = self._first("recorder"), self.take.name
         if not name or member is None:
             self._say("open a recording first" if member else "no recorder is there: start one")
             return
@@ -177,7 +218,7 @@ class Recordings:
             self._say("open a recording first")
 
     def _save(self) -> None:
-        member = self._recorder()
+        member = self._first("recorder")
         if not self.take.name or member is None:
             self._say("open a recording first" if member else "no recorder is there: start one")
             return

@@ -13,6 +13,7 @@ from viser import uplot
 
 from hmcs.shown import Markdown
 from hmcs_console.seeing.history import limits, with_room
+from hmcs_console.seeing.shelf import Shelved
 from hmcs_console.seeing.takes import CHOSEN, Take, band_color, bands, lines, played_at, states_of
 from hmcs_console.serving.buttons import (
     ADD,
@@ -31,6 +32,7 @@ from hmcs_console.serving.buttons import (
 from hmcs_console.serving.writing import Choice, add_words, fill, name_button, name_of_curve, write
 from hmcs_console.shapes.palette import FASTER, css
 from hmcs_console.shapes.pieces import add_pieces, draw_pieces
+from hmcs_console.teaching.parts import Parts
 
 _HEIGHT_PX = 210
 _SLIDER_STEPS = 1000
@@ -74,6 +76,9 @@ class Editing(Protocol):
     def note(self, text: str) -> None:
         """Write down a note about the recording."""
 
+    def segment(self, model: str, model_hash: str) -> None:
+        """Find the parts of the recording by a model."""
+
 
 class Timeline:
     """The controls, in the container that is open now; drawn on one thread."""
@@ -83,7 +88,7 @@ class Timeline:
     ) -> None:
         self._gui = gui
         self._editing = editing
-        self._drawn: tuple[Take, tuple[str, ...]] = (Take(), ())
+        self._drawn: tuple[Take, tuple[str, ...], tuple[Shelved, ...]] = (Take(), (), ())
         self._series: tuple[str, ...] = ()
         self._plot: viser.GuiUplotHandle | None = None
         self._slider: viser.GuiMultiSliderHandle[float] | None = None
@@ -95,6 +100,7 @@ class Timeline:
         )
         self._shown = gui.add_folder("Labels", visible=False)
         with self._shown:
+            self._parts = Parts(gui, editing)
             self._chosen = add_words(gui, order=6.0)
             self._state = Choice(gui, "State", order=10.0)
             label = gui.add_button(
@@ -145,12 +151,12 @@ class Timeline:
         asked = f"Delete {self._to_delete} for ever" if self._to_delete else "Delete"
         name_button(self._delete, asked)
 
-    def draw(self, take: Take, states: tuple[str, ...]) -> None:
-        """Draw what is shown of a recording, with the states of the task."""
-        before, states_before = self._drawn
-        if take is before and states == states_before:
+    def draw(self, take: Take, states: tuple[str, ...], models: tuple[Shelved, ...] = ()) -> None:
+        """Draw what is shown of a recording, with the states of the task and the models known."""
+        before, states_before, models_before = self._drawn
+        if take is before and (states, models) == (states_before, models_before):
             return
-        self._drawn = take, states
+        self._drawn = take, states, models
         write(self._said, take.said)
         self._choice.offer(take.recordings, none_too=not take.name)
         self._choice.choose(take.name)
@@ -162,13 +168,14 @@ class Timeline:
             fill(self._note, take.note)
         if not take.name:
             return
+        self._parts.draw(take, states, models)
         named = states_of(take, states)
         self._state.offer(named, none_too=False)
         if self._slider is None or (take.name, take.duration_s) != (before.name, before.duration_s):
             self._make_slider(take)
         if take.chosen_s != before.chosen_s:
             write(self._chosen, Markdown("Chosen: {:.2f} s to {:.2f} s").format(*take.chosen_s))
-        self._draw_bands(take, named, states)
+        self._draw_bands(take, named)
 
     def _label(self) -> None:
         if self._state.chosen:
@@ -195,7 +202,7 @@ class Timeline:
             )
         on_change(self._slider, self._choose)
 
-    def _draw_bands(self, take: Take, named: tuple[str, ...], states: tuple[str, ...]) -> None:
+    def _draw_bands(self, take: Take, named: tuple[str, ...]) -> None:
         data = bands(take, named)
         scales: dict[str, uplot.Scale] = {
             "x": uplot.Scale(time=False, auto=False, range=(0.0, max(take.duration_s, 1e-3))),
@@ -216,7 +223,7 @@ class Timeline:
                 uplot.Series(
                     label=name_of_curve(state),
                     width=0,
-                    fill=css(band_color(state, states)) + _TRANSPARENT,
+                    fill=css(band_color(state, named)) + _TRANSPARENT,
                 )
                 for state in named
             ),
@@ -264,6 +271,6 @@ class TakePath:
         if take is before and states == states_before:
             return
         self._drawn = take, states
-        whole, chosen = lines(take, states, self._origin)
+        whole, chosen = lines(take, states_of(take, states), self._origin)
         draw_pieces(self._path, whole)
         draw_pieces(self._chosen, chosen)

@@ -8,6 +8,7 @@ import viser
 
 from hmcs.motion.paths import Path
 from hmcs.recognition.model import Model
+from hmcs.task import Task
 from hmcs_console.seeing.seen import Picture
 from hmcs_console.serving.writing import add_words, write
 from hmcs_console.telling import spoken_reasons, spoken_rules
@@ -21,13 +22,19 @@ class Explained:
     """Writes it into two containers of the panel; made and drawn on one thread."""
 
     def __init__(
-        self, gui: viser.GuiApi, reasons: viser.GuiTabHandle, rules: viser.GuiTabHandle
+        self,
+        gui: viser.GuiApi,
+        reasons: viser.GuiTabHandle,
+        rules: viser.GuiTabHandle,
+        task: Task | None = None,
     ) -> None:
+        """Write into two tabs; `task` is what the stack is for, as long as no model is followed."""
         with reasons:
             # Below what is pressed there: its height changes.
             self._reasons = add_words(gui, order=_LAST)
         with rules:
             self._rules = add_words(gui)
+        self._own_task = task
         self._model: Model | None = None
         self._paths: Mapping[str, Path] = {}
 
@@ -40,4 +47,6 @@ class Explained:
         reasons = reasons_of(picture.belief, picture.evidence, picture.fixture, task, self._paths)
         state = "" if picture.fixture is None else picture.fixture.state
         write(self._reasons, spoken_reasons.reasons(reasons))
+        if not picture.active:
+            task = self._own_task
         write(self._rules, spoken_rules.rules(task, state))

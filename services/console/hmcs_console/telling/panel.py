@@ -124,7 +124,7 @@ class Panel:
         text = words.recognizers(picture.active, picture.agreement, nobody_runs_it=nobody)
         write(self._recognizers, text)
         write(self._services, words.services(picture.health, picture.unrun))
-        write(self._training, words.training(picture.training))
+        write(self._training, words.training(picture.training, picture.models))
         write(self._marking, words.marking(picture.marking))
         write(self._answer, picture.answer)
         write(self._takeover, picture.takeover)
@@ -132,7 +132,7 @@ class Panel:
         self._progress.value = 100.0 * share  # type: ignore[misc]
         self._offer(picture.recognizers)
         self._plots.draw(picture.rows)
-        self._timeline.draw(picture.take, picture.states)
+        self._timeline.draw(picture.take, picture.states, picture.models)
         self._folder = picture.folder
         self._offered.offer(picture.take.recordings, none_too=True)
 

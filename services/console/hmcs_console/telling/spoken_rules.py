@@ -14,12 +14,12 @@ _HEAD = Markdown("| state | law, compliance | up to k | tube, mm | leads |\n|---
 
 
 def rules(task: Task | None, state_now: str) -> Markdown:
-    """Return law, compliance, maximum factor ξ, volume and aim of every state of a task.
+    """Return law, compliance, maximum factor k, volume and aim of every state of a task.
 
     The state of the moment is in bold.
     """
     if task is None:
-        return Markdown("No recognizer is followed whose model is known here.")
+        return Markdown("The model that is followed is not known here.")
     every = rules_of(task)
     names = [state.name for state in task.states]
     rows = [

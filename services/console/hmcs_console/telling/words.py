@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
 
 from hmcs import process_words
 from hmcs.bus.keys import Member
@@ -10,8 +11,10 @@ from hmcs.bus.messages import Belief, FixtureState, Health, RobotState, Training
 from hmcs.palette import STATE_COLORS
 from hmcs.process_words import ILL, LATE, LOST, NOBODY, OK, REFUSED, detail, process_name, well
 from hmcs.recognizer_takeover import Agreement
-from hmcs.shown import Markdown, colored_dot
+from hmcs.shown import Markdown, colored_dot, linked
 from hmcs_console.seeing.marking import Marking
+from hmcs_console.seeing.reports import address_of
+from hmcs_console.seeing.shelf import Shelved
 from hmcs_console.shapes.palette import color_of, css
 
 RECORDING = "#d00000"
@@ -122,12 +125,17 @@ def services(health: Mapping[Member, Health | None], unrun: str = "") -> Markdow
     return _PARAGRAPHS.join([*rows, *(_doing(*each) for each in ordered)])
 
 
-def training(progress: TrainingProgress | None) -> Markdown:
-    """Return how far a training is."""
+def training(progress: TrainingProgress | None, models: Iterable[Shelved] = ()) -> Markdown:
+    """Return how far a training is, with the report of what was trained, where it is served."""
     if progress is None:
         return Markdown("No training was heard of.")
     text = Markdown("**{}** {}: {}").format(progress.model, progress.stage, progress.detail)
-    report = Markdown("report: {}").format(progress.report) if progress.report else Markdown("")
+    report = Markdown("")
+    if progress.report:
+        name = PurePath(progress.report).stem
+        served = any((model.name, model.report) == (progress.model, name) for model in models)
+        shown = linked(progress.report, address_of(name)) if served else progress.report
+        report = Markdown("report: {}").format(shown)
     return _LINES.join([line for line in (text, progress.path, report) if line])
 
 

@@ -37,7 +37,12 @@ from hmcs.bus.messages.recording import (
 )
 from hmcs.bus.messages.robot import RobotDescription, RobotState, StopRequest
 from hmcs.bus.messages.steps import LastSteps, LastStepsQuestion, Step
-from hmcs.bus.messages.training import Train, TrainingProgress
+from hmcs.bus.messages.training import (
+    Segmentation,
+    SegmentQuestion,
+    Train,
+    TrainingProgress,
+)
 
 __all__ = [
     "MESSAGES",
@@ -69,6 +74,8 @@ __all__ = [
     "Refusal",
     "RobotDescription",
     "RobotState",
+    "SegmentQuestion",
+    "Segmentation",
     "SetLabels",
     "SettingsReport",
     "Source",
@@ -109,6 +116,8 @@ MESSAGES: tuple[type[Message], ...] = (
     Outline,
     SetLabels,
     ChangeRecording,
+    SegmentQuestion,
+    Segmentation,
     Done,
 )
 """Every message there is, for schemas, golden bytes and tables."""

@@ -1,4 +1,4 @@
-"""Train a model, and how far the training is."""
+"""Train a model, how far the training is, and what a model finds in a recording."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from hmcs.bus.arrays import Floats
 from hmcs.bus.messages.fields import Name
 from hmcs.bus.messages.message import Message
 
@@ -46,3 +47,36 @@ class TrainingProgress(Message):
     """Of the model file, once it is written; as the trainer sees it."""
     report: str = ""
     """Of the report page beside it."""
+
+
+class SegmentQuestion(Message):
+    """Asks the trainer which part of the task each moment of a whole recording was, by a model."""
+
+    SCHEMA = "segment_question"
+
+    recording: str
+    """The recording, as the trainer sees it."""
+    model: Name
+    """Name of the model."""
+    model_hash: Name
+    """Of the model, as beliefs have it."""
+
+
+class Segmentation(Message):
+    """Which part of the task each moment of a recording was: the most probable segmentation."""
+
+    SCHEMA = "segmentation"
+
+    recording: str
+    """Name of the file, without folder."""
+    model: Name
+    """Name of the model that it was found by."""
+    begin_s: Floats
+    """Where each segment begins, s since the recording's first message, rising, shape (m,)."""
+    end_s: Floats
+    """Where it ends, shape (m,)."""
+    states: tuple[str, ...]
+    """Its state, or `state/gesteme` where a state has several; empty for unknown motion; m of
+    them."""
+    probability: Floats
+    """Mean over its steps of P(state | the whole motion), shape (m,)."""
