@@ -99,11 +99,9 @@ def test_a_public_arm_follows_a_circle(name: str, engine: str) -> None:
     assert off_the_circle_m(task, engine) < 0.002
 
 
-def test_joints_that_follow_others_are_followed(tmp_path: Path) -> None:
-    if find_spec("pybullet") is None:
-        pytest.skip("PyBullet has no wheels for this Python")
+def test_joints_that_follow_others_are_followed(tmp_path: Path, engine: str) -> None:
     task = task_of(written(tmp_path, arm({3: PARALLEL}, RAIL)), tool_link="tool")
-    assert off_the_circle_m(task, "pybullet") < 0.002
+    assert off_the_circle_m(task, engine) < 0.002
 
 
 def test_a_start_out_of_reach_names_the_reach(tmp_path: Path, engine: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
@@ -63,21 +62,6 @@ class DescribedArm(NamedTuple):
     def told(self) -> str:
         """What was assumed, a line each; empty where all is given."""
         return told(self.urdf.file, self.notes)
-
-    @property
-    def followers_on_the_way(self) -> tuple[str, ...]:
-        """Joints between base and tool that follow others."""
-        path = self.urdf.path_to(self.tool_link, self.model.base_link or self.urdf.root)
-        return tuple(joint.name for joint in path if joint.name in self.chain.followers)
-
-    def with_followers_held(self) -> DescribedArm:
-        """Return the arm with joints that follow others held where they are at home."""
-        stand = {
-            name: multiplier * float(self.home[leader]) + offset
-            for name, (leader, multiplier, offset) in self.chain.followers.items()
-        }
-        chain = replace(self.chain, followers={}, held={**self.chain.held, **stand})
-        return self._replace(chain=chain)
 
 
 def describe(model: RobotModel) -> DescribedArm:
