@@ -14,7 +14,10 @@ from hmcs_robot.description.chain import pose_of
 from hmcs_robot.description.described import describe
 from hmcs_robot.kinematics import UnreachablePoseError
 from hmcs_robot.lockstep import LockstepRobot
-from hmcs_robot.robots import model_of
+from hmcs_robot.robots import RobotModel, model_of
+from hmcs_robot.set_up import simulated
+from hmcs_robot.settings import RobotSettings
+from hmcs_robot.simulation import StartPoseError
 from support.urdfs import LIMIT, arm, joint, link, written
 
 RADIUS_M, ROUND_S, PERIOD_S = 0.04, 3.0, 0.01
@@ -109,3 +112,26 @@ def test_a_start_out_of_reach_names_the_reach(tmp_path: Path, engine: str) -> No
     task = task_of(file, tool_start_m=(3.0, 0.0, 0.5), tool_orientation_xyzw=(0, 0, 0, 1))
     with pytest.raises(UnreachablePoseError, match=r"robot own .*gets up to 1\.\d+ m"):
         LockstepRobot(task, engine)
+
+
+def test_a_task_begins_in_the_posture_it_names(tmp_path: Path, engine: str) -> None:
+    file = written(tmp_path, arm())
+    # The elbow the other way round than at the home that is found.
+    given = {"ready": (0.2, 0.9, -1.6, 0.3, 0.5, 0.1)}
+    start = pose_of(describe(RobotModel(file, "tool")).chain.poses(np.array(given["ready"])))
+    place = {
+        "tool_start_m": tuple(start.position),
+        "tool_orientation_xyzw": tuple(start.orientation),
+    }
+    task = task_of(file, tool_link="tool", poses=given, start_pose="ready", **place)
+    simulation = simulated(task, RobotSettings(engine=engine))
+    np.testing.assert_allclose(simulation.read().joint_positions, given["ready"], atol=1e-6)
+    simulation.close()
+    elsewhere = task_of(
+        file, tool_link="tool", poses=given, start_pose="ready",
+        tool_start_m=(0.5, 0.0, 0.5), tool_orientation_xyzw=(0, 0, 0, 1),
+    )  # fmt: skip
+    with pytest.raises(StartPoseError, match=r"write tool_start_m: \[0\.\d+, "):
+        LockstepRobot(elsewhere, engine)
+    with pytest.raises(ValueError, match="start_pose is 'rest', expected one of poses: ready"):
+        task_of(file, tool_link="tool", poses=given, start_pose="rest", **place)
