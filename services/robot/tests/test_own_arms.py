@@ -45,6 +45,13 @@ WRITTEN = {
         {6: joint("j6", "l5", "l6", "continuous", "1 0 0", "0.06 0 0", '<limit effort="20"/>')}
     ),
     "mimic gripper": arm(more=FINGERS),
+    "five axes": arm({4: joint("j4", "l3", "l4", "fixed", xyz="0.2 0 0")}),
+    "four axes": arm(
+        {k: joint(f"j{k}", f"l{k - 1}", f"l{k}", "fixed", xyz="0.2 0 0") for k in (4, 6)}
+    ),
+    "three axes": arm(
+        {k: joint(f"j{k}", f"l{k - 1}", f"l{k}", "fixed", xyz="0.1 0 0") for k in (4, 5, 6)}
+    ),
     "no limits": arm({2: joint("j2", "l1", "l2", axis="0 1 0", xyz="0 0 0.2", more="")}),
 }
 PUBLIC = {
