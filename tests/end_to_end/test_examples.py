@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import lzma
+import re
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -120,6 +122,57 @@ def test_a_program_without_hmcs_hears_beliefs(
     assert step.removesuffix(":").isdigit()
     assert state in load_model(model_file).state_names
     assert 0.0 <= float(probability) <= 1.0
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    """The C++ client, where there are a compiler and the libraries for it."""
+    missing = [name for name in ("cmake", "c++") if shutil.which(name) is None]
+    if missing:
+        pytest.skip(f"{' and '.join(missing)}: not installed")
+    source, folder = EXAMPLES / "listen_in_cpp", tmp_path / "build"
+    made = subprocess.run(
+        ["cmake", "-S", source, "-B", folder], capture_output=True, text=True, check=False
+    )
+    if made.returncode:
+        found = re.search(r'configuration file provided by "(\w+)"', made.stderr)
+        assert found is not None, made.stderr
+        pytest.skip(f"{found[1]} is not installed")
+    subprocess.run(["cmake", "--build", folder], check=True, capture_output=True)
+    return folder / "listen"
+
+
+def test_a_program_in_cpp_hears_beliefs_and_the_robot(
+    built: Path, scene: Scene, steps: list[Step], model_file: Path
+) -> None:
+    stack = scene.stack
+    stack.bring_up("recognizer", "r", "--model", model_file)
+    robot = stack.start_program("robot", "point", EXAMPLES / "07_own_robot.py")
+    stack.until_ready(robot)
+    heard = stack.folder / "heard.txt"
+    with heard.open("wb") as stream:
+        listener = subprocess.Popen(
+            [str(built), stack.endpoint, CELL], stdout=stream, stderr=subprocess.STDOUT
+        )
+    try:
+        scene.hand.play(steps, 20.0)
+
+        def heard_both() -> tuple[str, str] | None:
+            assert listener.poll() is None, heard.read_text()
+            lines = heard.read_text().splitlines()[:-1]
+            beliefs = [line for line in lines if line.startswith("step ")]
+            robots = [line for line in lines if line.startswith("point: ")]
+            return (beliefs[0], robots[0]) if beliefs and robots else None
+
+        belief, state = stack.until(heard_both)
+    finally:
+        listener.kill()
+        listener.wait()
+    _, step, name, probability = belief.split()
+    assert step.removesuffix(":").isdigit()
+    assert name in load_model(model_file).state_names
+    assert 0.0 <= float(probability) <= 1.0
+    assert re.fullmatch(r"point: -?\d\.\d{3} -?\d\.\d{3} -?\d\.\d{3} m, \w+", state)
 
 
 def test_a_recording_is_reported_in_numbers_and_as_demonstrations(tmp_path: Path) -> None:

@@ -6,39 +6,25 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 
 from hmcs.bus.messages import Belief, FixtureState, Train, TrainingProgress
 from hmcs.bus.session import Bus
 from hmcs.bus.verbs import TRAIN
-from hmcs.errors import UserError
 from hmcs.recognition.model_file import load_model
 from hmcs.recognizer_takeover import activate, load_into_fixture, load_into_recognizer
-from hmcs_local.connecting import open_operator
 from hmcs_local.stack import LAYERED, LocalStack, with_free_port
-from support.stack import CELL, DEADLINE_S, clean_environment
+from support.stack import CELL, clean_environment
+from support.waiting import operator_at, wait_until
 
 COMPOSE = Path(__file__).parents[2] / "compose.yaml"
 DATA = COMPOSE.parent / "examples/data"
 HANDS = [DATA / f"hand-{k}.csv" for k in (1, 2, 3, 4)]
 STATES = {"reach", "turn", "lift"}
-A = TypeVar("A")
-
-
-def wait_until(look: Callable[[], A | None], what: str, deadline_s: float = 3 * DEADLINE_S) -> A:
-    """Return the first result that counts as true; fails with `what` after the deadline."""
-    until_s = time.monotonic() + deadline_s
-    while time.monotonic() < until_s:
-        if found := look():
-            return found
-        time.sleep(0.01)
-    raise AssertionError(f"not within {deadline_s:g} s: {what}")
 
 
 @pytest.fixture
@@ -75,19 +61,12 @@ def joined() -> Iterator[Callable[[str], Bus]]:
     buses: list[Bus] = []
 
     def join(router: str) -> Bus:
-        buses.append(wait_until(lambda: _open(router), "the router"))
+        buses.append(wait_until(lambda: operator_at(router), "the router"))
         return buses[-1]
 
     yield join
     for bus in buses:
         bus.close()
-
-
-def _open(router: str) -> Bus | None:
-    try:
-        return open_operator(router, CELL)
-    except UserError:
-        return None
 
 
 def hmcs(folder: Path, *words: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as arrow
 import pyarrow.parquet as parquet
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag2.enums import StoragePlugin
@@ -169,6 +170,47 @@ def write_json_mcap(
                 channels[topic] = writer.register_channel(topic, "json", number)
             text = json.dumps(fields).encode()
             writer.add_message(channels[topic], ns, text, ns)
+        writer.finish()
+    return path
+
+
+def write_protobuf_mcap(path: Path, positions: Array, described: bool = True) -> Path:
+    """Write poses in a type as Foxglove's `PoseInFrame`, described within the file by Protobuf."""
+    described_set = descriptor_pb2.FileDescriptorSet()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(described_set.file.add())
+    file = described_set.file.add(name="pose.proto", package="lab", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    number, text, inner = 1, 9, 11
+    for name, parts in {
+        "Vector": [(axis, number, "") for axis in "xyz"],
+        "Pose": [("position", inner, ".lab.Vector")],
+        "PoseInFrame": [
+            ("timestamp", inner, ".google.protobuf.Timestamp"),
+            ("frame_id", text, ""),
+            ("pose", inner, ".lab.Pose"),
+        ],
+    }.items():
+        message = file.message_type.add(name=name)
+        for place, (field, kind, type_name) in enumerate(parts, start=1):
+            message.field.add(
+                name=field, number=place, label=1, type=kind, type_name=type_name or None
+            )
+    pool = descriptor_pool.DescriptorPool()
+    for each in described_set.file:
+        pool.Add(each)
+    made = message_factory.GetMessageClass(pool.FindMessageTypeByName("lab.PoseInFrame"))
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start("", "another program")
+        data = described_set.SerializeToString() if described else b""
+        schema = writer.register_schema("lab.PoseInFrame", "protobuf", data)
+        channel = writer.register_channel("/tool", "protobuf", schema)
+        for ns, (x, y, z) in zip(times_ns(len(positions)), positions.tolist(), strict=True):
+            said = made(frame_id="base")
+            said.timestamp.seconds, said.timestamp.nanos = divmod(ns, 10**9)
+            said.pose.position.x, said.pose.position.y, said.pose.position.z = x, y, z
+            # The messages came a while later than their own times say.
+            writer.add_message(channel, ns + 5 * 10**9, said.SerializeToString(), ns)
         writer.finish()
     return path
 

@@ -72,6 +72,7 @@ _IN_ORDER_OF_HELP = (
     recordings.inspect,
     recordings.label,
     recordings.export,
+    recordings.view,
     recordings.replay,
     demonstrations.check,
     demonstrations.segment,

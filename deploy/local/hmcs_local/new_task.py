@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 from hmcs.bus.keys import KeyNameError, check_name
 from hmcs.errors import UserError
@@ -18,12 +22,18 @@ PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
 STATES = ("approach", "work", "retract")
 
 
-class Place(NamedTuple):
-    """Where an arm that comes along begins, its tool along +x, and the room about it, m."""
+URDF = ".urdf"
+_ROOM_M = (0.15, 0.3, 0.2)
+"""About where an arm of one's own begins, to each side along x, y, z."""
 
-    start_m: tuple[float, float, float]
-    lower_m: tuple[float, float, float]
-    upper_m: tuple[float, float, float]
+
+class Place(NamedTuple):
+    """Where an arm begins, and the room about it, m; those that come along look along +x."""
+
+    start_m: tuple[float, ...]
+    lower_m: tuple[float, ...]
+    upper_m: tuple[float, ...]
+    orientation_xyzw: tuple[float, ...] = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)
 
 
 PLACES = {
@@ -35,18 +45,32 @@ PLACES = {
 
 
 def write_new_task(
-    file: Path, states: Sequence[str], robot: str, plane: Plane | None, *, force: bool = False
+    file: Path,
+    states: Sequence[str],
+    robot: str,
+    plane: Plane | None,
+    *,
+    tool_link: str | None = None,
+    force: bool = False,
 ) -> None:
     """Write a task file whose name is the file's, without its ending.
 
-    Raises UserError for a file that is there already (unless `force`), an unknown robot, and names
-    that no task can have.
+    `robot` is one that comes along, or the file of a URDF, whose tool is `tool_link` where several
+    links may be. Raises UserError for a file that is there already (unless `force`), an unknown
+    robot, an arm that cannot be used, and names that no task can have.
     """
     check_file_place(file, "NAME")
     if file.exists() and not force:
         raise UserError(f"{file}: is there already: choose another name, or --force to replace it")
-    if robot not in PLACES:
-        raise UserError(f"--robot: {unknown_name_message('robot', robot, tuple(PLACES))}")
+    if robot.lower().endswith(URDF):
+        place, setup = _own_arm(Path(robot), tool_link, file.parent)
+    elif robot not in PLACES:
+        told = unknown_name_message("robot", robot, tuple(PLACES))
+        raise UserError(f"--robot: {told}, or the file of a URDF")
+    elif tool_link is not None:
+        raise UserError(f"--tool-link {tool_link}: {robot} has its own; it is for a URDF")
+    else:
+        place, setup = PLACES[robot], f"model: {robot}  # one of {', '.join(PLACES)}"
     for state in states:
         try:
             check_name("state", state)
@@ -54,7 +78,7 @@ def write_new_task(
             raise UserError(f"--states: {error}") from error
     if len(set(states)) < len(states):
         raise UserError(f"--states: {', '.join(states)}: expected every state once")
-    text = task_text(file.stem, states, robot, plane)
+    text = task_text(file.stem, states, place, setup, plane)
     try:
         with written_whole(file) as written:
             written.write_text(text, encoding="utf-8")
@@ -65,9 +89,45 @@ def write_new_task(
         raise UserError(f"{file}: cannot be written: {error.strerror}") from error
 
 
-def task_text(name: str, states: Sequence[str], robot: str, plane: Plane | None) -> str:
-    """Return a task file with one gesteme for each state, in the order given."""
-    place = PLACES[robot]
+def _own_arm(urdf: Path, tool_link: str | None, folder: Path) -> tuple[Place, str]:
+    """Return where an arm of one's own begins, and the lines that name it in a file of `folder`.
+
+    It begins at its home; raises UserError for an arm that cannot be used.
+    """
+    from hmcs_robot.description.checking import reach_of, tool_at
+    from hmcs_robot.description.described import check_follows, describe
+    from hmcs_robot.robots import RobotModel, ros_package_path
+
+    arm = describe(RobotModel(urdf, tool_link, package_path=ros_package_path()))
+    check_follows(arm)
+    tool, reach = tool_at(arm.chain, arm.home), reach_of(arm.chain, 2000)
+    room = np.array(_ROOM_M)
+    start = tool.position.round(4)
+    place = Place(
+        tuple(start.tolist()),
+        tuple(np.minimum(np.maximum(start - room, reach.lower), start - 0.01).round(3).tolist()),
+        tuple(np.maximum(np.minimum(start + room, reach.upper), start + 0.01).round(3).tolist()),
+        tuple(tool.orientation.tolist()),
+    )
+    named = Path(os.path.relpath(urdf.resolve(), folder.resolve())).as_posix()
+    home = ", ".join(f"{at:.4g}" for at in arm.home)
+    setup = f"""urdf: {json.dumps(named)}  # beside this file
+  tool_link: {json.dumps(arm.tool_link)}  # its frame is the tool frame
+  # A comfortable posture, rad (m of prismatic joints), in the order of the joints:
+  # {", ".join(arm.chain.joint_names)}
+  home: [{home}]
+  # Other postures by name; start_pose names the one to begin in.
+  poses: {{}}"""
+    return place, setup
+
+
+def task_text(
+    name: str, states: Sequence[str], place: Place, setup: str, plane: Plane | None
+) -> str:
+    """Return a task file with one gesteme for each state, in the order given.
+
+    `setup` are the lines that name the robot.
+    """
     gestemes = "\n".join(f"  - {{name: {state}}}" for state in states)
     following = [*states[1:], None]
     chain = "\n".join(
@@ -115,10 +175,10 @@ workspace:
   #  - {{name: tabletop, shape: plane, position_m: [0, 0, 0.28], normal: [0, 0, 1]}}
 
 robot:
-  model: {robot}  # one of {", ".join(PLACES)}
-  # Where the tool begins, m, and how it is turned; it keeps it. This one looks forward.
+  {setup}
+  # Where the tool begins, m, and how it is turned, x y z w; it keeps it.
   tool_start_m: {list(place.start_m)}
-  tool_orientation_xyzw: [0.0, 0.7071067811865476, 0.0, 0.7071067811865476]
+  tool_orientation_xyzw: {list(place.orientation_xyzw)}
   tool_radius_m: 0.0  # it is kept out of forbidden regions as a ball of this size
   speed_limit_m_s: 0.25
   angular_speed_limit_rad_s: 0.5

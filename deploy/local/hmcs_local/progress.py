@@ -12,9 +12,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 @contextmanager
 def fits_shown(wanted: bool) -> Iterator[Callable[[int, int], None]]:
     """Yield the callback that takes how many of all fits are done."""
+    with progress_shown("choosing settings", wanted) as update:
+        yield update
+
+
+@contextmanager
+def progress_shown(what: str, wanted: bool = True) -> Iterator[Callable[[int, int], None]]:
+    """Yield the callback that takes how much of all is done of `what`."""
     console = Console(stderr=True)
     with Progress(
-        "choosing settings",
+        what,
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -22,5 +29,5 @@ def fits_shown(wanted: bool) -> Iterator[Callable[[int, int], None]]:
         transient=True,
         disable=not (wanted and console.is_terminal),
     ) as progress:
-        bar = progress.add_task("choosing settings", total=None)
+        bar = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(bar, completed=done, total=total)

@@ -9,8 +9,12 @@ from hmcs.errors import UserError
 from hmcs.task import check_task, load_task
 from hmcs_local.new_task import PLACES, PLANES, STATES, task_name_of, write_new_task
 from hmcs_robot.driver import Pose
+from hmcs_robot.set_up import simulated
+from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation
 from support.arms import arm
+from support.urdfs import arm as own_arm
+from support.urdfs import written
 
 
 @pytest.mark.parametrize("plane", [None, *PLANES])
@@ -78,3 +82,22 @@ def test_the_ending_of_task_files_is_added_where_it_is_missing() -> None:
     assert task_name_of("pick") == Path("pick.yaml")
     assert task_name_of("pick.v2") == Path("pick.v2.yaml")
     assert task_name_of("tasks/pick.yml") == Path("tasks/pick.yml")
+
+
+def test_a_task_of_an_own_arm_begins_at_its_home(tmp_path: Path) -> None:
+    urdf = written(tmp_path, own_arm())
+    file = tmp_path / "tasks" / "pick.yaml"
+    file.parent.mkdir()
+    write_new_task(file, STATES, str(urdf), None, tool_link="tool")
+    task = load_task(file)
+    assert Path(task.robot.urdf or "").resolve() == urdf
+    assert not task.workspace.excess_m(task.robot.tool_start_m)
+    simulation = simulated(task, RobotSettings())
+    expected = [task.robot.home[k] for k in range(6)]  # type: ignore[index]
+    np.testing.assert_allclose(simulation.read().joint_positions, expected, atol=5e-3)
+    simulation.close()
+    with pytest.raises(UserError, match="did you mean tool"):
+        write_new_task(tmp_path / "a.yaml", STATES, str(urdf), None, tool_link="tol")
+    with pytest.raises(UserError, match="puma560 has its own"):
+        write_new_task(tmp_path / "b.yaml", STATES, "puma560", None, tool_link="tool")
+    assert not (tmp_path / "a.yaml").exists()

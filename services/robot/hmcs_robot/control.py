@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hmcs.arrays import Array, shortened
-from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.motion import quaternions
 from hmcs_robot.driver import ArmState, Pose
+from hmcs_robot.inverses import inverse_of
 from hmcs_robot.limits import (
     Limits,
     bounds_of,
@@ -127,7 +127,7 @@ def follow(
     fast_enough = within_speed(twist, limits)
     walled = within_walls(fast_enough, arm.tool.position, limits)
     admitted = within_planes(walled, planes, limits)
-    inverse = _Inverse(arm.jacobian, tuning.damping)
+    inverse = inverse_of(arm.jacobian, tuning.damping)
     clear = inverse.smallest / (2 * tuning.damping)
     into = min(1.0, max(0.0, inverse.into_singularity(admitted) / tuning.surely_into))
     slowed = admitted * (1.0 - into * (1.0 - min(1.0, max(clear, tuning.slowest_share))))
@@ -182,58 +182,6 @@ def _lag(tool: Pose, reference: Pose, tuning: Tuning) -> Array:
             ),
         ]
     )
-
-
-class _Inverse:
-    """The damped inverse of a Jacobian (6, n), and its null space."""
-
-    def __init__(self, jacobian: Array, damping: float) -> None:
-        left, singular, right = np.linalg.svd(jacobian)
-        self.smallest = float(singular[-1])
-        self._jacobian, self._damping = jacobian, damping
-        self._into, self._joints = left[:, -1], right[5]
-        """Of the smallest singular value: what the tool cannot do, and what the joints would."""
-        self._inverse = right[:6].T @ ((singular / (singular**2 + damping**2))[:, None] * left.T)
-        self._null_space = right[6:]
-
-    def into_singularity(self, twist: Array) -> float:
-        """Return the cosine between the joints' motion for `twist` and the steepest way into the
-        nearest singularity; negative where it leads out.
-
-        The joints are taken as if they were damped no more than at their fastest, 1/2λ: what
-        damping holds back goes into the singularity all the same.
-        """
-        held_back = 1.0 / (2.0 * self._damping) - self.smallest / (
-            self.smallest**2 + self._damping**2
-        )
-        joints = self.velocities(twist) + self._joints * float(self._into @ twist) * held_back
-        steepest = -self._growth()
-        size = float(np.linalg.norm(joints) * np.linalg.norm(steepest))
-        return float(joints @ steepest) / size if size > 0 else 0.0
-
-    def _growth(self) -> Array:
-        """Return how the smallest singular value grows with each joint, (n,): uᵀ ∂J/∂q v.
-
-        ∂Jᵢ/∂qⱼ is ωⱼ × (vᵢ, ωᵢ) for a joint j before i, and (ωᵢ × vⱼ, 0) for one after it.
-        """
-        linear, angular = self._jacobian[:3].T, self._jacobian[3:].T
-        # (ω × v)·u = ω·(v × u), so that what is summed over i is crossed once.
-        linear_across = cross(linear, self._into[:3])
-        across = linear_across + cross(angular, self._into[3:])
-        shares = self._joints[:, None]
-        behind = np.cumsum((shares * across)[::-1], axis=0)[::-1]
-        ahead = np.cumsum(shares * angular, axis=0) - shares * angular
-        return np.asarray(np.vecdot(angular, behind) + np.vecdot(linear_across, ahead))
-
-    def velocities(self, twist: Array) -> Array:
-        """Return the joint velocities (n,) for `twist`."""
-        velocities: Array = self._inverse @ twist
-        return velocities
-
-    def within_null_space(self, velocities: Array) -> Array:
-        """Return the part of `velocities` that leaves the tool where it is."""
-        part: Array = self._null_space.T @ (self._null_space @ velocities)
-        return part
 
 
 def _differ(one: Array, other: Array) -> bool:

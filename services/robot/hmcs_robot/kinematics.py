@@ -10,12 +10,15 @@ from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
 from hmcs_robot.driver import JointLimits, Pose
+from hmcs_robot.inverses import FULL, inverse_of, smallest_singular_value
 
 _ACCURACY_M = 1e-6
 _ITERATIONS = 150
 _TRIES = 24
 _LARGEST_STEP_RAD = 0.3
 _DAMPING = 0.01
+_AS_WELL_TURNED_RAD = 0.01
+"""Postures of an arm of few joints that differ by less in their angle are equally good."""
 _COMFORTABLE_MANIPULABILITY = 0.1
 _COMFORTABLE_RAD = 0.3
 """A joint further than this from the ends of its range counts as free."""
@@ -54,13 +57,15 @@ def inverse_kinematics(arm: Kinematics, robot: str, target: Pose, home: Array) -
 
     They are within their limits. The solution found from `home` is taken where it is comfortable:
     far from singularities and from the ends of the joints' ranges. Otherwise the most comfortable
-    one near `home` is, of those found from postures drawn at random (always the same ones).
+    one near `home` is, of those found from postures drawn at random (always the same ones). An arm
+    of fewer than six joints has its tool at the position, turned as nearly as it can be.
 
     Raises UnreachablePoseError, which names the pose, the robot and the distance short.
     """
     limits = arm.limits
     first = _descend(arm, target, home)
-    if _reached(first) and _is_comfortable(arm, first.joint_positions):
+    few = len(home) < FULL
+    if not few and _reached(first) and _is_comfortable(arm, first.joint_positions):
         return first.joint_positions
     random = np.random.default_rng(0)
     # A joint that turns without end is tried within a turn.
@@ -77,6 +82,9 @@ def inverse_kinematics(arm: Kinematics, robot: str, target: Pose, home: Array) -
             f"{nearest.distance_m:.3f} m and {np.degrees(nearest.angle_rad):.0f}° short. Choose a "
             "tool_start_m and tool_orientation_xyzw within its reach, or another robot model"
         )
+    if few:
+        least_rad = min(solution.angle_rad for solution in reached)
+        reached = [each for each in reached if each.angle_rad < least_rad + _AS_WELL_TURNED_RAD]
     return max(reached, key=lambda s: _comfort(arm, s.joint_positions, home)).joint_positions
 
 
@@ -93,16 +101,15 @@ def _descend(arm: Kinematics, target: Pose, start: Array) -> _Solution:
         )
         if float(np.abs(error).max()) < _ACCURACY_M:
             break
-        jacobian = arm.jacobian(positions)
-        damped = jacobian @ jacobian.T + _DAMPING**2 * np.eye(6)
-        step = jacobian.T @ np.linalg.solve(damped, error)
+        step = inverse_of(arm.jacobian(positions), _DAMPING).velocities(error)
         step = step * min(1.0, _LARGEST_STEP_RAD / max(float(np.abs(step).max()), 1e-12))
         positions = np.clip(positions + step, arm.limits.lower, arm.limits.upper)
     return _Solution(positions, float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
 
 def _reached(solution: _Solution) -> bool:
-    return solution.distance_m < 1e-5 and solution.angle_rad < 1e-4
+    turned = solution.angle_rad < 1e-4 or len(solution.joint_positions) < FULL
+    return solution.distance_m < 1e-5 and turned
 
 
 def _is_comfortable(arm: Kinematics, positions: Array) -> bool:
@@ -119,8 +126,7 @@ def _comfort(arm: Kinematics, positions: Array, home: Array) -> float:
 
 
 def _manipulability(arm: Kinematics, positions: Array) -> float:
-    """Return the smallest singular value of the Jacobian."""
-    return float(np.linalg.svd(arm.jacobian(positions), compute_uv=False)[-1])
+    return float(smallest_singular_value(arm.jacobian(positions)))
 
 
 def _to_ends(arm: Kinematics, positions: Array) -> float:

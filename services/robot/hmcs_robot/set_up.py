@@ -39,6 +39,7 @@ def simulated(task: Task, settings: RobotSettings) -> Simulation:
             task.workspace.obstacles,
             task.workspace.forbidden,
             model_of(task.robot),
+            task.robot.start_pose,
         ),
         1.0 / settings.physics_rate_hz,
         engine=settings.engine,

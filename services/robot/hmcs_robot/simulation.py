@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+
 from hmcs.arrays import Array
 from hmcs.errors import UserError
+from hmcs.motion import quaternions
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm_description import ArmDescription, arm_description
-from hmcs_robot.description.checking import reach_of
-from hmcs_robot.description.described import check_follows, describe
+from hmcs_robot.description.checking import reach_of, tool_at
+from hmcs_robot.description.described import (
+    DescribedArm,
+    check_follows,
+    describe,
+    joint_positions_text,
+)
 from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
@@ -23,6 +31,8 @@ _SELF_MARGIN_M = 0.005
 _LINKS_WITHIN_M = 0.08
 """Links nearer to a forbidden region than this are slowed down: farther than an arm that moves at
 0.25 m/s goes while it slows to a stand."""
+_OFF_M, _OFF_RAD = 0.002, 0.02
+"""A named posture whose tool is no farther from where the task begins is one of that start."""
 _WITHIN_M = 0.002
 """A link so near to a region at the start pose, or inside, is not kept out of that region."""
 ITSELF = "itself"
@@ -45,6 +55,8 @@ class Scene(NamedTuple):
     """Regions that the links are kept out of; they are no bodies to collide with."""
     model: RobotModel | None = None
     """The arm; None for the one of that name."""
+    start_pose: str | None = None
+    """Which of the arm's named postures it begins in; None: one is found for `start`."""
 
 
 class Simulation:
@@ -53,7 +65,8 @@ class Simulation:
     One `move` is one step of the physics of `period_s`. The arm and the obstacles collide; the arm
     stops where its own links meet. `links_within` names the links that reach into a forbidden
     region at the start pose already, and so are not kept out of it. Raises UnreachablePoseError
-    where the arm cannot reach the start pose, StartPoseError where it touches an obstacle there,
+    where the arm cannot reach the start pose, StartPoseError where it touches an obstacle there or
+    the tool is elsewhere in the posture it is to begin in,
     UserError where no window opens or there is no such engine.
     """
 
@@ -115,6 +128,8 @@ class Simulation:
 
     def _start_posture(self, scene: Scene) -> Array:
         arm = self._described
+        if scene.start_pose is not None:
+            return _named_posture(arm, scene.start_pose, scene.start)
         try:
             return inverse_kinematics(self.engine, scene.robot, scene.start, arm.home)
         except UnreachablePoseError as error:
@@ -194,3 +209,18 @@ class Simulation:
                 meeting.one, meeting.on_one, meeting.normal, positions
             ) - separation(meeting.other, meeting.on_other, meeting.normal, positions)
             yield Touch(ITSELF, parting)
+
+
+def _named_posture(arm: DescribedArm, name: str, start: Pose) -> Array:
+    """Return a named posture, (n,); raises StartPoseError where its tool is not at the start."""
+    positions = arm.poses[name]
+    tool = tool_at(arm.chain, positions)
+    off_m = float(np.linalg.norm(tool.position - start.position))
+    turned = quaternions.between(tool.orientation, start.orientation)
+    if off_m > _OFF_M or float(np.linalg.norm(turned)) > _OFF_RAD:
+        raise StartPoseError(
+            f"{arm.urdf.file}: in start_pose {name!r} the tool is not where the task begins: write "
+            f"tool_start_m: {joint_positions_text(tool.position)} and tool_orientation_xyzw: "
+            f"{joint_positions_text(tool.orientation)}, or leave start_pose out"
+        )
+    return positions

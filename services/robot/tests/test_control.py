@@ -8,7 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hmcs_robot.control import Following, Standing, Tuning, _Inverse, stand
+from hmcs_robot.control import Following, Standing, Tuning, stand
+from hmcs_robot.inverses import Inverse
 from support.arms import arm, needs
 
 SPEED_TOLERANCE = 1.02
@@ -241,7 +242,7 @@ def test_the_way_into_a_singularity_is_the_one_finite_differences_find(bench: An
     for _ in range(600):
         rig.follow([0.15, 0.02, 0, 0, 0, 0.05])
     arm = rig.simulation.read()
-    inverse = _Inverse(arm.jacobian, 0.02)
+    inverse = Inverse(arm.jacobian, 0.02)
     found = []
     for joint in range(6):
         pair = []

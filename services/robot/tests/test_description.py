@@ -15,7 +15,7 @@ from hmcs_robot.description.checking import reach_of
 from hmcs_robot.description.described import check_follows, describe, tool_links
 from hmcs_robot.description.urdf import UrdfError, read_urdf
 from hmcs_robot.robots import ROBOTS, RobotModel
-from support.urdfs import LIMIT, arm, joint, link, written
+from support.urdfs import LIMIT, OFFSETS, arm, joint, link, written
 
 
 def model(file: Path, **more: object) -> RobotModel:
@@ -177,10 +177,39 @@ def test_the_one_link_that_may_be_the_tool_is_taken_and_of_several_one_is_asked_
         describe(model(file, tool_link=None))
 
 
-def test_an_arm_of_few_joints_is_refused_with_their_names(tmp_path: Path) -> None:
-    described = describe(model(written(tmp_path, arm()), base_link="l2"))
-    with pytest.raises(UrdfError, match=r"4 joints that move \(j3, j4, j5, j6\), expected 6"):
+def few(*held: int) -> str:
+    """Return the arm with some of its joints fixed."""
+    fixed = {
+        k: joint(f"j{k}", f"l{k - 1}" if k > 1 else "base", f"l{k}", "fixed", xyz=OFFSETS[k - 1])
+        for k in held
+    }
+    return arm(fixed)
+
+
+def test_an_arm_that_cannot_be_led_everywhere_is_refused_with_what_it_cannot(
+    tmp_path: Path,
+) -> None:
+    described = describe(model(written(tmp_path, few(1, 2, 3, 4))))
+    with pytest.raises(UrdfError, match=r"2 joints that move \(j5, j6\), expected 3 or more"):
         check_follows(described)
+    # Three parallel axes move it in a plane.
+    described = describe(model(written(tmp_path, few(1, 4, 6))))
+    with pytest.raises(UrdfError, match=r"do not move 'tool' along \(-?0\.00, -?1\.00, -?0\.00\)"):
+        check_follows(described)
+
+
+@pytest.mark.parametrize(("held", "lost"), [((4,), 1), ((4, 6), 2), ((4, 5, 6), 3)])
+def test_which_turns_an_arm_of_few_joints_cannot_follow_is_told(
+    tmp_path: Path, held: tuple[int, ...], lost: int
+) -> None:
+    described = describe(model(written(tmp_path, few(*held))))
+    check_follows(described)
+    assert f"{6 - len(held)} joints lead link tool to every position" in described.told
+    assert described.told.count("(-") + described.told.count("(0") == (lost if lost < 3 else 0)
+
+
+def test_the_tool_of_an_arm_of_few_joints_is_found(tmp_path: Path) -> None:
+    assert tool_links(read_urdf(written(tmp_path, few(4)))) == ("tool",)
 
 
 def test_reach_is_that_of_the_stretched_arm(tmp_path: Path) -> None:

@@ -14,7 +14,10 @@ from hmcs_robot.description.chain import pose_of
 from hmcs_robot.description.described import describe
 from hmcs_robot.kinematics import UnreachablePoseError
 from hmcs_robot.lockstep import LockstepRobot
-from hmcs_robot.robots import model_of
+from hmcs_robot.robots import RobotModel, model_of
+from hmcs_robot.set_up import simulated
+from hmcs_robot.settings import RobotSettings
+from hmcs_robot.simulation import StartPoseError
 from support.urdfs import LIMIT, arm, joint, link, written
 
 RADIUS_M, ROUND_S, PERIOD_S = 0.04, 3.0, 0.01
@@ -42,6 +45,13 @@ WRITTEN = {
         {6: joint("j6", "l5", "l6", "continuous", "1 0 0", "0.06 0 0", '<limit effort="20"/>')}
     ),
     "mimic gripper": arm(more=FINGERS),
+    "five axes": arm({4: joint("j4", "l3", "l4", "fixed", xyz="0.2 0 0")}),
+    "four axes": arm(
+        {k: joint(f"j{k}", f"l{k - 1}", f"l{k}", "fixed", xyz="0.2 0 0") for k in (4, 6)}
+    ),
+    "three axes": arm(
+        {k: joint(f"j{k}", f"l{k - 1}", f"l{k}", "fixed", xyz="0.1 0 0") for k in (4, 5, 6)}
+    ),
     "no limits": arm({2: joint("j2", "l1", "l2", axis="0 1 0", xyz="0 0 0.2", more="")}),
 }
 PUBLIC = {
@@ -99,11 +109,9 @@ def test_a_public_arm_follows_a_circle(name: str, engine: str) -> None:
     assert off_the_circle_m(task, engine) < 0.002
 
 
-def test_joints_that_follow_others_are_followed(tmp_path: Path) -> None:
-    if find_spec("pybullet") is None:
-        pytest.skip("PyBullet has no wheels for this Python")
+def test_joints_that_follow_others_are_followed(tmp_path: Path, engine: str) -> None:
     task = task_of(written(tmp_path, arm({3: PARALLEL}, RAIL)), tool_link="tool")
-    assert off_the_circle_m(task, "pybullet") < 0.002
+    assert off_the_circle_m(task, engine) < 0.002
 
 
 def test_a_start_out_of_reach_names_the_reach(tmp_path: Path, engine: str) -> None:
@@ -111,3 +119,26 @@ def test_a_start_out_of_reach_names_the_reach(tmp_path: Path, engine: str) -> No
     task = task_of(file, tool_start_m=(3.0, 0.0, 0.5), tool_orientation_xyzw=(0, 0, 0, 1))
     with pytest.raises(UnreachablePoseError, match=r"robot own .*gets up to 1\.\d+ m"):
         LockstepRobot(task, engine)
+
+
+def test_a_task_begins_in_the_posture_it_names(tmp_path: Path, engine: str) -> None:
+    file = written(tmp_path, arm())
+    # The elbow the other way round than at the home that is found.
+    given = {"ready": (0.2, 0.9, -1.6, 0.3, 0.5, 0.1)}
+    start = pose_of(describe(RobotModel(file, "tool")).chain.poses(np.array(given["ready"])))
+    place = {
+        "tool_start_m": tuple(start.position),
+        "tool_orientation_xyzw": tuple(start.orientation),
+    }
+    task = task_of(file, tool_link="tool", poses=given, start_pose="ready", **place)
+    simulation = simulated(task, RobotSettings(engine=engine))
+    np.testing.assert_allclose(simulation.read().joint_positions, given["ready"], atol=1e-6)
+    simulation.close()
+    elsewhere = task_of(
+        file, tool_link="tool", poses=given, start_pose="ready",
+        tool_start_m=(0.5, 0.0, 0.5), tool_orientation_xyzw=(0, 0, 0, 1),
+    )  # fmt: skip
+    with pytest.raises(StartPoseError, match=r"write tool_start_m: \[0\.\d+, "):
+        LockstepRobot(elsewhere, engine)
+    with pytest.raises(ValueError, match="start_pose is 'rest', expected one of poses: ready"):
+        task_of(file, tool_link="tool", poses=given, start_pose="rest", **place)

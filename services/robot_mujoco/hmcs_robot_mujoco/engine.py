@@ -12,6 +12,7 @@ import numpy as np
 from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.task import ForbiddenRegion
+from hmcs_robot.description.following import CAUGHT_UP_PER_S, followed_by
 from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN, Cell, Meeting, Near
 from hmcs_robot.solids import corners_of
@@ -40,6 +41,10 @@ class MujocoEngine:
         arm = cell_of.arm
         self.limits, self.joint_names = arm.chain.limits, arm.chain.joint_names
         self._torques = arm.chain.efforts
+        moved = [self._model.joint(k).name for k in range(self._model.njnt)]
+        self._per_joint, self._offsets = followed_by(arm.chain, moved)
+        self._leaders = [moved.index(name) for name in self.joint_names]
+        """Of the joints that MuJoCo moves; the others follow these."""
         self._tool = int(self._model.body(arm.tool_link).id)
         self._tool_offset = np.array([0.0, 0.0, cell.model.tool_offset_m])
         self._mass = np.zeros((self._model.nv, self._model.nv))
@@ -68,7 +73,7 @@ class MujocoEngine:
 
     def place(self, joint_positions: Array) -> None:
         """Put the arm at `joint_positions`, rad, shape (n,), at rest."""
-        self._data.qpos[:] = joint_positions
+        self._data.qpos[:] = self._all_moved(joint_positions)
         self._data.qvel[:] = 0.0
         mujoco.mj_step1(self._model, self._data)
 
@@ -84,7 +89,7 @@ class MujocoEngine:
 
     def joints(self) -> tuple[Array, Array]:
         """Return joint positions, rad, and velocities, rad/s, both of shape (n,)."""
-        return self._data.qpos.copy(), self._data.qvel.copy()
+        return self._data.qpos[self._leaders], self._data.qvel[self._leaders]
 
     def separation_per_joint(
         self, link: int, points: Array, normals: Array, joint_positions: Array
@@ -126,10 +131,7 @@ class MujocoEngine:
     def step(self, joint_velocities: Array) -> None:
         """Advance the physics by one period, with the motors at `joint_velocities`, rad/s, (n,)."""
         mujoco.mj_fullM(self._model, self._data, self._mass)
-        acceleration = (joint_velocities - self._data.qvel) / self._period_s
-        self._data.qfrc_applied[:] = torques_for(
-            acceleration, self._mass, self._data.qfrc_bias, self._torques
-        )
+        self._data.qfrc_applied[:] = self._applied(joint_velocities)
         mujoco.mj_step2(self._model, self._data)
         mujoco.mj_step1(self._model, self._data)
         if self._window is not None:
@@ -140,6 +142,22 @@ class MujocoEngine:
         if self._window is not None:
             self._window.close()
 
+    def _applied(self, joint_velocities: Array) -> Array:
+        """Return the torques on all joints, m of them, that the arm's motors have, (m,).
+
+        Joints that follow others move with them as if gears joined them: the motors carry both.
+        """
+        data, per_joint = self._data, self._per_joint
+        acceleration = (joint_velocities - data.qvel[self._leaders]) / self._period_s
+        behind = CAUGHT_UP_PER_S * (self._all_moved(data.qpos[self._leaders]) - data.qpos)
+        drawn = (per_joint @ data.qvel[self._leaders] + behind - data.qvel) / self._period_s
+        mass = per_joint.T @ self._mass @ per_joint
+        bias = per_joint.T @ (self._mass @ drawn + data.qfrc_bias)
+        torques = torques_for(acceleration, mass, bias, self._torques)
+        reached = per_joint @ np.linalg.solve(mass, torques - bias) + drawn
+        applied: Array = self._mass @ reached + data.qfrc_bias
+        return applied
+
     def _tool_point(self, data: mujoco.MjData) -> Array:
         turn = data.xmat[self._tool].reshape(3, 3)
         point: Array = data.xpos[self._tool] + turn @ self._tool_offset
@@ -147,18 +165,24 @@ class MujocoEngine:
 
     def _at(self, joint_positions: Array) -> mujoco.MjData:
         """Return MuJoCo's data of a posture."""
-        if np.array_equal(joint_positions, self._data.qpos):
+        positions = self._all_moved(joint_positions)
+        if np.array_equal(positions, self._data.qpos):
             return self._data
-        self._elsewhere.qpos[:] = joint_positions
+        self._elsewhere.qpos[:] = positions
         mujoco.mj_kinematics(self._model, self._elsewhere)
         mujoco.mj_comPos(self._model, self._elsewhere)
         return self._elsewhere
 
     def _jacobian(self, data: mujoco.MjData, link: int, point: Array) -> Array:
-        """Return the Jacobian of a point of a link, (6, n)."""
+        """Return the Jacobian of a point of a link, by the arm's joints, (6, n)."""
         jacobian = np.zeros((6, self._model.nv))
         mujoco.mj_jac(self._model, data, jacobian[:3], jacobian[3:], point, link)
-        return jacobian
+        return np.asarray(jacobian @ self._per_joint)
+
+    def _all_moved(self, joint_positions: Array) -> Array:
+        """Return the positions of all joints that MuJoCo moves, for those of the arm, (n,)."""
+        positions: Array = self._per_joint @ joint_positions + self._offsets
+        return positions
 
     def _grouped(self, found: Iterable[Closest], names: dict[int, str]) -> Iterator[Near]:
         """Yield what is near, each link and name once."""

@@ -54,7 +54,7 @@ class Loaded(NamedTuple):
 
 def loaded(cell: Cell, period_s: float) -> Loaded:
     """Return a cell in MuJoCo; raises UserError for an arm that MuJoCo cannot load."""
-    arm = _described(cell)
+    arm = describe(cell.model)
     spec = _spec(arm)
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 1, 0
@@ -89,18 +89,6 @@ def loaded(cell: Cell, period_s: float) -> Loaded:
         {model.geom(name).id: obstacle.name for name, obstacle in obstacles.items()},
         {name: tuple(geoms) for name, geoms in numbers.items()},
     )
-
-
-def _described(cell: Cell) -> DescribedArm:
-    """Return the arm of a cell; raises UserError for one that this engine does not move."""
-    arm = describe(cell.model)
-    following = arm.followers_on_the_way
-    if following:
-        raise UserError(
-            f"{arm.urdf.file}: the joints {', '.join(following)} between base and tool mimic "
-            "others, which the engine mujoco does not do: use the engine pybullet"
-        )
-    return arm.with_followers_held()
 
 
 def _spec(arm: DescribedArm) -> mujoco.MjSpec:

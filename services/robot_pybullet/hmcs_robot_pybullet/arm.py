@@ -17,14 +17,12 @@ from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
-from hmcs_robot.description.chain import Chain
 from hmcs_robot.description.described import DescribedArm
+from hmcs_robot.description.following import CAUGHT_UP_PER_S, followed_by
 from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN
 
 BASE_LINK = -1
-_CAUGHT_UP_PER_S = 20.0
-"""Rate at which a joint that follows another is drawn to where it belongs."""
 
 
 class Arm:
@@ -41,7 +39,7 @@ class Arm:
         self.moving_joints: list[int] = [info[0] for info in movable]
         """Those of the arm and those that follow them."""
         names = [info[1].decode() for info in movable]
-        self._per_joint, self._offsets = _following(arm.chain, names)
+        self._per_joint, self._offsets = followed_by(arm.chain, names)
         self.joint_names = arm.chain.joint_names
         self.joints: list[int] = [
             self.moving_joints[names.index(name)] for name in self.joint_names
@@ -106,7 +104,7 @@ class Arm:
             )
             at = dict(zip(self.moving_joints, (state[0] for state in states), strict=True))
             wanted = self._all_moving(np.array([at[joint] for joint in self.joints]))
-            velocities = velocities + _CAUGHT_UP_PER_S * (wanted - list(at.values()))
+            velocities = velocities + CAUGHT_UP_PER_S * (wanted - list(at.values()))
         followed: list[float] = velocities.tolist()
         return followed
 
@@ -188,18 +186,6 @@ def _load(arm: DescribedArm, client: int) -> int:
                 "leave out the shapes it does not read"
             ) from error
     return body
-
-
-def _following(chain: Chain, names: list[str]) -> tuple[Array, Array]:
-    """Return how moving joints follow those of the arm: (m, n) and what is added, (m,)."""
-    per_joint, offsets = np.zeros((len(names), len(chain.joint_names))), np.zeros(len(names))
-    for row, name in enumerate(names):
-        if name in chain.followers:
-            leader, per_joint_of_it, offsets[row] = chain.followers[name]
-            per_joint[row, leader] = per_joint_of_it
-        else:
-            per_joint[row, chain.joint_names.index(name)] = 1.0
-    return per_joint, offsets
 
 
 def _inertial_frame(body: int, link: int, client: int) -> Pose:

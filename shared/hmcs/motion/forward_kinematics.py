@@ -17,9 +17,8 @@ from hmcs.arrays import Array
 from hmcs.bounded_files import read_bounded
 from hmcs.errors import UserError
 from hmcs.motion.quaternions import continuous, from_matrix
+from hmcs.motion.urdf_xml import MOST_BYTES, urdf_element
 
-MOST_BYTES = 16_000_000
-"""Of a URDF."""
 MOVING = ("revolute", "continuous", "prismatic")
 TOOLS = ("tool0", "tcp", "tool", "tool_link", "ee_link", "end_effector", "gripper_frame_link")
 """Names of links that are taken for the tool where nobody names it, the first that is there."""
@@ -69,10 +68,10 @@ def read_chain(file: Path, link: str = "") -> Chain:
     """Return the chain from the root of a URDF to a link; by default to its tool.
 
     That is the first of TOOLS that is there, else the only link that carries no other. Raises
-    ChainError, naming the file and what it has, for a file that is no URDF, for no such link or
-    several that may be meant, and for a joint that has no position of one number.
+    UrdfXmlError for a file that is no URDF, and ChainError, naming the file and what it has, for no
+    such link or several that may be meant, and for a joint that has no position of one number.
     """
-    root = _xml(file)
+    root = urdf_element(read_bounded(file, MOST_BYTES), str(file))
     above = {_child(file, joint): joint for joint in root.findall("joint")}
     links = [each.get("name", "") for each in root.findall("link")]
     link = link or _tool(file, links, above)
@@ -123,19 +122,6 @@ def _turns(axis: Array, angles: Array) -> Array:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
     return np.asarray(np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross))
-
-
-def _xml(file: Path) -> ElementTree.Element:
-    data = read_bounded(file, MOST_BYTES)
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise ChainError(f"{file}: has a document type, which a URDF has no need of: remove it")
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ChainError(f"{file}: is no XML, and so no URDF: {error}") from error
-    if root.tag != "robot":
-        raise ChainError(f"{file}: begins with <{root.tag[:40]}>, expected <robot>: give a URDF")
-    return root
 
 
 def _tool(file: Path, links: Sequence[str], above: Mapping[str, ElementTree.Element]) -> str:

@@ -222,7 +222,9 @@ class ToolSetup(Part):
 
 JointPositions = dict[str, Number] | tuple[Number, ...]
 """rad, or m of a prismatic joint: by joint, or of all joints in their order."""
-_OF_A_URDF = ("tool_link", "base_link", "tool_offset_m", "home", "poses", "package_path")
+_OF_A_URDF = (
+    *("tool_link", "base_link", "tool_offset_m", "home", "poses", "start_pose", "package_path"),
+)
 _NO_PART_OF_A_NAME = re.compile(r"[^A-Za-z0-9._-]+")
 _LONGEST_NAME = 64
 
@@ -245,6 +247,9 @@ class RobotSetup(Part):
     default one is found."""
     poses: Mapping[Name, JointPositions] = {}
     """Other postures of the arm, by name; as home."""
+    start_pose: Name | None = None
+    """The one of `poses` that the task begins in: of several postures with the tool where it
+    starts, this one. By default a comfortable one near home is found."""
     package_path: tuple[str, ...] = ()
     """Folders that hold the packages of `package://` names in the URDF; beside the task file where
     they are no absolute paths."""
@@ -288,6 +293,13 @@ class RobotSetup(Part):
                 f"{', '.join(needless)} belongs to an arm of your own (urdf: FILE), and model "
                 f"{self.model} has its own: leave it out"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _begins_in_one_of_its_poses(self) -> Self:
+        if self.start_pose is not None and self.start_pose not in self.poses:
+            there = ", ".join(self.poses) or "none"
+            raise ValueError(f"start_pose is {self.start_pose!r}, expected one of poses: {there}")
         return self
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Make and use recordings: `record`, `mark`, `inspect`, `label`, `export`, `replay`."""
+"""Make and use recordings: `record`, `mark`, `inspect`, `label`, `export`, `view`, `replay`."""
 
 from __future__ import annotations
 
@@ -151,6 +151,34 @@ def export(
             export_to_others(recording_named(recording, folder, note), to, form, fps, console)
         case _:
             raise UserError(f"--format: {unknown_name_message('format', form, FORMATS)}")
+
+
+def view(
+    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="In Rerun's viewer; needs the extra hmcs[rerun].")
+    ] = False,
+    save: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Write what Rerun opens, on any machine."),
+    ] = None,
+) -> None:
+    """Show a recording in space and over time: robot, ways, beliefs, states, forces, fixture.
+
+    In Foxglove it opens as it is; see `hmcs export` for a layout.
+    """
+    from hmcs_local.viewing import save_for_rerun, show_in_rerun
+
+    if not rerun:
+        raise UserError(
+            "name a viewer: --rerun; in Foxglove the recording opens as it is, with the layout "
+            "that `hmcs export` writes"
+        )
+    console = Console(highlight=False, soft_wrap=True)
+    if save is None:
+        show_in_rerun(recording, console)
+    else:
+        save_for_rerun(recording, save, console)
 
 
 def replay(

@@ -18,8 +18,15 @@ def new(
         str, typer.Option(metavar="A,B,…", help="Parts of the task, in their order.")
     ] = ",".join(STATES),
     robot: Annotated[
-        str, typer.Option(metavar="NAME", help=f"Which arm: {', '.join(PLACES)}.")
+        str,
+        typer.Option(
+            metavar="NAME|FILE.urdf", help=f"Which arm: {', '.join(PLACES)}, or one of your own."
+        ),
     ] = "puma560",
+    tool_link: Annotated[
+        str | None,
+        typer.Option(metavar="LINK", help="Of your arm, whose frame is the tool frame."),
+    ] = None,
     plane: Annotated[
         str | None,
         typer.Option(metavar="PLANE", help="The motion lies in a plane: xy, xz or yz."),
@@ -37,7 +44,7 @@ def new(
     chosen = next((each for each in PLANES if each == plane), None)
     if plane is not None and chosen is None:
         raise UserError(f"--plane {plane}: expected one of {', '.join(PLANES)}")
-    write_new_task(file, parts, robot, chosen, force=force)
+    write_new_task(file, parts, robot, chosen, tool_link=tool_link, force=force)
     typer.echo(f"{file}: a task of {len(parts)} states; bring it up with `hmcs up {file}`")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
@@ -17,10 +16,13 @@ from hmcs_robot.description.elements import Mistake
 from hmcs_robot.description.meshes import READ, MeshFiles, unusable
 from hmcs_robot.description.prepared import assumed_masses, prepared
 from hmcs_robot.description.urdf import Urdf, UrdfError, read_urdf, told
+from hmcs_robot.inverses import FEWEST, FULL, smallest_singular_value
 from hmcs_robot.robots import JointPositions, RobotModel
 
-FEWEST_JOINTS = 6
-"""A tool is commanded in six directions."""
+_LEAST_M_PER_RAD = 0.01
+"""An arm whose tool moves less in some direction, in a comfortable posture, cannot be led."""
+_LEAST_RAD_PER_RAD = 0.01
+"""The same of its turning."""
 _POSTURES = 512
 """Among which the home of an arm without one is looked for."""
 _AROUND_MIDDLE = 0.6
@@ -42,7 +44,8 @@ class DescribedArm(NamedTuple):
     poses: Mapping[str, Array]
     """Named postures."""
     notes: tuple[Mistake, ...]
-    """What the file leaves out and what is assumed, and what it names and nobody can use."""
+    """What the file leaves out and what is assumed, what it names and nobody can use, and what an
+    arm of few joints cannot follow."""
 
     def to_simulate(self, formats: Collection[str] = READ) -> str:
         """Return a URDF whose files are named by absolute paths, with meshes of these formats."""
@@ -63,21 +66,6 @@ class DescribedArm(NamedTuple):
     def told(self) -> str:
         """What was assumed, a line each; empty where all is given."""
         return told(self.urdf.file, self.notes)
-
-    @property
-    def followers_on_the_way(self) -> tuple[str, ...]:
-        """Joints between base and tool that follow others."""
-        path = self.urdf.path_to(self.tool_link, self.model.base_link or self.urdf.root)
-        return tuple(joint.name for joint in path if joint.name in self.chain.followers)
-
-    def with_followers_held(self) -> DescribedArm:
-        """Return the arm with joints that follow others held where they are at home."""
-        stand = {
-            name: multiplier * float(self.home[leader]) + offset
-            for name, (leader, multiplier, offset) in self.chain.followers.items()
-        }
-        chain = replace(self.chain, followers={}, held={**self.chain.held, **stand})
-        return self._replace(chain=chain)
 
 
 def describe(model: RobotModel) -> DescribedArm:
@@ -107,26 +95,68 @@ def describe(model: RobotModel) -> DescribedArm:
         name: posture(model.urdf, chain, f"pose {name!r}", given)
         for name, given in model.poses.items()
     }
-    notes = (*chain.assumed, *assumed_masses(urdf, chain), *unusable(urdf, files))
+    notes = (
+        *chain.assumed,
+        *assumed_masses(urdf, chain),
+        *unusable(urdf, files),
+        *_not_followed(urdf, chain, tool_link, home),
+    )
     return DescribedArm(model, tool_link, urdf, chain, files, home, poses, tuple(sorted(notes)))
 
 
 def check_follows(arm: DescribedArm) -> None:
-    """Raise UrdfError for an arm that cannot follow a tool's velocity in every direction."""
+    """Raise UrdfError for an arm that cannot follow its tool's velocity in every direction."""
     names, base = arm.chain.joint_names, arm.model.base_link or arm.urdf.root
-    if len(names) < FEWEST_JOINTS:
+    where = f"{arm.urdf.file}:{arm.urdf.links[arm.tool_link]}: "
+    if len(names) < FEWEST:
         raise UrdfError(
-            f"{arm.urdf.file}:{arm.urdf.links[arm.tool_link]}: between {base!r} and "
-            f"{arm.tool_link!r} there are {len(names)} joints that move ({', '.join(names)}), "
-            f"expected {FEWEST_JOINTS} or more: a tool is commanded in six directions. Choose "
-            "another tool_link or base_link"
+            f"{where}between {base!r} and {arm.tool_link!r} there are {len(names)} joints that "
+            f"move ({', '.join(names)}), expected {FEWEST} or more: a tool is led in three "
+            "directions. Choose another tool_link or base_link"
+        )
+    moves, lengths, _ = np.linalg.svd(arm.chain.jacobians(arm.home)[:3])
+    if lengths[-1] < _LEAST_M_PER_RAD:
+        along = ", ".join(f"{value:.2f}" for value in moves[:, -1])
+        raise UrdfError(
+            f"{where}the joints {', '.join(names)} do not move {arm.tool_link!r} along "
+            f"({along}) in {base!r}, so that it cannot be led in every direction: choose another "
+            "tool_link, or an arm with a joint for it"
         )
 
 
-def tool_links(urdf: Urdf) -> tuple[str, ...]:
-    """Return the links that may be a tool: with enough joints above, and nothing below or a name
-    that tools have.
+def _not_followed(urdf: Urdf, chain: Chain, tool_link: str, home: Array) -> tuple[Mistake, ...]:
+    """Return which turns of its tool an arm of fewer than six joints cannot follow, if it is one.
+
+    As it is at home, while the tool stays in its place.
     """
+    count = len(chain.joint_names)
+    if not FEWEST <= count < FULL:
+        return ()
+    jacobian = chain.jacobians(home)
+    _, _, right = np.linalg.svd(jacobian[:3])
+    turning, sizes, _ = np.linalg.svd(jacobian[3:] @ right[3:].T)
+    lost = turning[:, int((sizes > _LEAST_RAD_PER_RAD).sum()) :].T
+    axes = " and ".join("(" + ", ".join(f"{value:.2f}" for value in axis) + ")" for axis in lost)
+    line = urdf.links[tool_link]
+    what = "turns of" if len(lost) == 3 else f"turns about {axes} (base frame, at home) of"
+    return (
+        Mistake(
+            line,
+            f"{count} joints lead link {tool_link} to every position; {what} its orientation are "
+            "not followed, and it turns while it moves",
+        ),
+    )
+
+
+def tool_links(urdf: Urdf) -> tuple[str, ...]:
+    """Return the links that may be a tool: with nothing below or a name that tools have.
+
+    They have six joints above them; three where no link has six.
+    """
+    return _tool_links(urdf, FULL) or _tool_links(urdf, FEWEST)
+
+
+def _tool_links(urdf: Urdf, fewest: int) -> tuple[str, ...]:
     parents = {joint.parent for joint in urdf.joints.values()}
     candidates = []
     for link in urdf.links:
@@ -137,7 +167,7 @@ def tool_links(urdf: Urdf) -> tuple[str, ...]:
             chain = chain_of(urdf, link)
         except UrdfError:
             continue
-        if len(chain.joint_names) < FEWEST_JOINTS:
+        if len(chain.joint_names) < fewest:
             continue
         candidates.append((not usual, link))
     return tuple(link for _, link in sorted(candidates, key=lambda each: each[0]))
@@ -150,8 +180,8 @@ def only_tool_link(urdf: Urdf) -> str:
         return candidates[0]
     if not candidates:
         raise UrdfError(
-            f"{urdf.file}: no link hangs on six or more joints that move (revolute, continuous or "
-            "prismatic, one after another): expected an arm. Name another link as tool_link to "
+            f"{urdf.file}: no link hangs on three or more joints that move (revolute, continuous "
+            "or prismatic, one after another): expected an arm. Name another link as tool_link to "
             "read what is in its way"
         )
     raise UrdfError(
@@ -204,7 +234,7 @@ def comfortable_posture(chain: Chain) -> Array:
     """
     lower, upper = chain.finite_range
     drawn = np.vstack([(lower + upper) / 2, chain.drawn(_POSTURES, _AROUND_MIDDLE)])
-    smallest = np.linalg.svd(chain.jacobians(drawn), compute_uv=False)[:, -1]
+    smallest = smallest_singular_value(chain.jacobians(drawn))
     to_ends = np.minimum(drawn - chain.limits.lower, chain.limits.upper - drawn).min(axis=1)
     best = int(np.argmax(smallest + 0.5 * np.minimum(to_ends, _ROOM_ENOUGH)))
     return np.asarray(drawn[best])

@@ -1,4 +1,4 @@
-"""MCAP files of other programs: messages of ROS, and JSON with a position in it.
+"""MCAP files of other programs: messages of ROS, JSON or Protobuf with a position in it.
 
 Read within the same bounds as recordings of our own.
 """
@@ -13,13 +13,16 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from mcap import records as mcap
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from hmcs.recordings.foreign.logs import Message, Topic
+from hmcs.recordings.foreign.protobuf_messages import protobuf_fields
 from hmcs.recordings.foreign.ros_types import LARGEST_MESSAGE_BYTES, decoded, modern_name
 from hmcs.recordings.foreign.said import POSES, Kind, NoSampleError, Said, kind_of, said_in_json
 from hmcs.recordings.foreign.tracks import LATEST_NS
-from hmcs.recordings.mcap_channels import Channel, Channels, TextBudget
+from hmcs.recordings.mcap_channels import Channel, Channels, Strict, TextBudget
 from hmcs.recordings.mcap_chunks import (
     LARGEST_CHUNK_BYTES,
     DamageError,
@@ -35,6 +38,7 @@ from hmcs.recordings.scanning import EXPANSION_SLACK_BYTES, MOST_EXPANSION
 
 _ROS = {"cdr": False, "ros1": True}
 """Encodings of messages of ROS, and whether it is ROS 1."""
+_JSON, _PROTOBUF = "json", "protobuf"
 _CHUNK_HEAD_BYTES = 128
 
 
@@ -42,6 +46,8 @@ class _Raw(NamedTuple):
     channel: Channel
     log_ns: int
     data: bytes
+    description: bytes
+    """Of the type of a message of Protobuf."""
 
 
 class McapLog(NamedTuple):
@@ -90,7 +96,8 @@ class McapLog(NamedTuple):
 
 
 def _raw_messages(stream: BinaryIO, size: int, topics: Collection[str] | None) -> Iterator[_Raw]:
-    channels, file = Channels(TextBudget()), RecordFile(stream, size, None, ())
+    budget, file = TextBudget(), RecordFile(stream, size, None, ())
+    channels, types = Channels(budget), _Types(budget)
     left = size * MOST_EXPANSION + EXPANSION_SLACK_BYTES
     for record in file.records():
         if isinstance(record, Cut):
@@ -109,16 +116,35 @@ def _raw_messages(stream: BinaryIO, size: int, topics: Collection[str] | None) -
             data = unpacked(chunk)
             check(chunk, data)
             for opcode, begin, end in records_in(data):
-                yield from _taken(channels, opcode, data, begin, end, topics)
+                yield from _taken(channels, types, opcode, data, begin, end, topics)
         elif record.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
             if record.end - record.content > LARGEST_CHUNK_BYTES:
                 raise DamageError(f"a record of more than {LARGEST_CHUNK_BYTES / 1e6:.0f} MB")
             data = file.read(record.content, record.end)
-            yield from _taken(channels, record.opcode, data, 0, len(data), topics)
+            yield from _taken(channels, types, record.opcode, data, 0, len(data), topics)
+
+
+class _Types:
+    """Descriptions of types of Protobuf, by their names."""
+
+    def __init__(self, budget: TextBudget) -> None:
+        self._budget = budget
+        self.by_name: dict[str, bytes] = {}
+
+    def take(self, record: bytes) -> None:
+        """Take in the record of a schema, if it is of Protobuf; DamageError where it is none."""
+        try:
+            schema = mcap.Schema.read(Strict(record))
+        except (McapError, ValueError, OverflowError) as error:
+            raise DamageError(f"a damaged schema ({error})") from error
+        if schema.encoding == _PROTOBUF and schema.name not in self.by_name:
+            self._budget.hold(schema.name, schema.data.decode("latin-1"))
+            self.by_name[schema.name] = schema.data
 
 
 def _taken(
     channels: Channels,
+    types: _Types,
     opcode: int,
     data: bytes,
     begin: int,
@@ -128,6 +154,8 @@ def _taken(
     """The message in a record, if it is one on these topics; channels are noted."""
     if opcode != Opcode.MESSAGE:
         channels.take(opcode, data[begin:end])
+        if opcode == Opcode.SCHEMA:
+            types.take(data[begin:end])
         return
     message = message_at(data, begin, end)
     channel = channels.get(message.channel)
@@ -136,7 +164,8 @@ def _taken(
     if message.log_ns > LATEST_NS:
         raise DamageError(f"a message on {channel.topic[:80]!r} of no possible time")
     if topics is None or channel.topic in topics:
-        yield _Raw(channel, message.log_ns, data[message.begin : message.end])
+        description = types.by_name.get(channel.schema, b"")
+        yield _Raw(channel, message.log_ns, data[message.begin : message.end], description)
 
 
 def _type_name(channel: Channel) -> str:
@@ -146,10 +175,10 @@ def _type_name(channel: Channel) -> str:
 
 
 def _kind(raw: _Raw) -> Kind | None:
-    """What a channel's messages say, by its type or, where that is JSON, by its first message."""
+    """What a channel's messages say: by their type in ROS, else by the first of them."""
     if raw.channel.encoding in _ROS:
         return kind_of(modern_name(raw.channel.schema))
-    if raw.channel.encoding != "json":
+    if raw.channel.encoding not in (_JSON, _PROTOBUF):
         return None
     try:
         _said("", raw)
@@ -165,6 +194,8 @@ def _said(where: str, raw: _Raw) -> Said:
         return decoded(where, name, raw.data, ros1=_ROS[encoding])
     if len(raw.data) > LARGEST_MESSAGE_BYTES:
         raise NoSampleError(f"has {len(raw.data) / 1e6:.0f} MB, which no pose has")
+    if encoding == _PROTOBUF:
+        return said_in_json(protobuf_fields(raw.channel.schema, raw.description, raw.data))
     try:
         fields = json.loads(raw.data)
     except (ValueError, RecursionError) as error:

@@ -305,3 +305,16 @@ def test_an_mcap_message_that_is_no_pose_is_refused_with_its_number(tmp_path: Pa
     sent = [("/xyz", made.BEGUN_NS + k, fields) for k, fields in enumerate(rows)]
     message = refused(made.write_json_mcap(tmp_path / "f.mcap", sent))
     assert "/xyz: message 3 has 'far' in place of a number" in message
+
+
+def test_poses_of_protobuf_are_read_by_the_type_their_file_describes(tmp_path: Path) -> None:
+    shown = only(made.write_protobuf_mcap(tmp_path / "p.mcap", made.way()))
+    np.testing.assert_array_equal(shown.positions, made.way())
+    expected = (np.array(made.times_ns()) - made.BEGUN_NS) / 1e9
+    np.testing.assert_allclose(shown.time_s - shown.time_s[0], expected, atol=1e-9)
+
+
+def test_protobuf_that_is_not_described_is_no_motion(tmp_path: Path) -> None:
+    message = refused(made.write_protobuf_mcap(tmp_path / "q.mcap", made.way(), described=False))
+    assert "lab.PoseInFrame, protobuf" in message
+    assert message.count("\n") == 0
