@@ -104,7 +104,7 @@ def test_a_robot_killed_in_motion_is_stopped_and_resumes_only_when_a_person_does
     stack.until(lambda: sent)
 
     servo.send(signal.SIGKILL)
-    stack.until(lambda: driver.states[-1].stop == "late_tick")
+    stack.until(lambda: driver.states[-1].stop == "silent_arm")
     stack.until(lambda: not np.any(twist_in(sent[-1].twist)))
     assert "silent" in stack.health(robot).detail
 
