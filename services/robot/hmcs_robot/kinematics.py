@@ -6,10 +6,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from hmcs.arms.state import JointLimits, Pose
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
-from hmcs_robot.driver import JointLimits, Pose
 
 _ACCURACY_M = 1e-6
 _ITERATIONS = 150

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from hmcs.arms.state import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
 from hmcs_robot.arm_description import ArmDescription, arm_description
 from hmcs_robot.description.checking import reach_of
 from hmcs_robot.description.described import check_follows, describe
-from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
 from hmcs_robot.robots import RobotModel, robot_named

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hmcs_robot.control import Following, Standing, Tuning, _Inverse, stand
+from hmcs.arms.control import Following, Standing, Tuning, _Inverse, stand
 from support.arms import arm, needs
 
 SPEED_TOLERANCE = 1.02

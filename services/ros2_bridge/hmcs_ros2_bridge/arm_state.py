@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.motion.quaternions import between
 from hmcs_ros2_bridge.fields import NonsenseError, check_frame, pose_in
@@ -20,10 +21,7 @@ _LONGEST_GAP_S = 0.5
 class ArmReport(NamedTuple):
     """The tool at one moment, base frame."""
 
-    position: Array
-    """m, shape (3,)."""
-    orientation: Array
-    """x y z w, shape (4,)."""
+    pose: Pose
     twist: Array
     """m/s and rad/s, shape (6,), over the time since the report before, by the arm's own clock."""
     stamp_s: float
@@ -68,10 +66,10 @@ def report_of(message: Any, heard_ns: int, before: ArmReport | None, frame: str)
     stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
     moving = np.zeros(6)
     if before is not None and 0.0 < stamp_s - before.stamp_s <= _LONGEST_GAP_S:
-        turn = between(before.orientation, orientation)
-        moved = np.concatenate([position - before.position, turn])
+        turn = between(before.pose.orientation, orientation)
+        moved = np.concatenate([position - before.pose.position, turn])
         moving = moved / (stamp_s - before.stamp_s)
-    return ArmReport(position, orientation, moving, stamp_s, heard_ns)
+    return ArmReport(Pose(position, orientation), moving, stamp_s, heard_ns)
 
 
 class ArmReports:

@@ -47,7 +47,7 @@ from hmcs_ros2_bridge.arm_state import ArmReports
 from hmcs_ros2_bridge.fields import header, twist
 from hmcs_ros2_bridge.robot_settings import RosRobotSettings
 from hmcs_ros2_bridge.ros import Node, Topic
-from hmcs_ros2_bridge.tool_limits import Limited, tool_limits_of
+from hmcs_ros2_bridge.tool_limits import Limited, admitted, fence_of, tool_limits_of
 
 OTHERS_EVERY_S = 0.5
 """How often other publishers on the command's topic are looked for."""
@@ -71,6 +71,7 @@ class RosRobot(Service):
             settings.acceleration_limit_m_s2,
             settings.angular_acceleration_limit_rad_s2,
         )
+        self._fence = fence_of(self._task, self._limits)
         self._policy = Policy(
             longest_valid_ns=round(settings.command_valid_for_ms * 1e6),
             late_tick_ns=round(settings.hang_s * 1e9),
@@ -223,8 +224,8 @@ class RosRobot(Service):
         elapsed_s = min((now_ns - self._admitted_ns) / _NS_PER_S, 0.1)
         before, arm = self._admitted.twist, self._arm.newest
         if self._supervision.stop == "none" and arm is not None:
-            limited = self._limits.admitted(
-                self._supervision.twist, arm.position, arm.orientation, before, elapsed_s
+            limited = admitted(
+                self._supervision.twist, arm.pose, before, self._limits, self._fence, elapsed_s
             )
         else:
             limited = _STANDS
@@ -270,8 +271,8 @@ class RosRobot(Service):
                 joint_names=joints.names,
                 joint_positions=joints.positions,
                 joint_velocities=joints.velocities,
-                tool_position=arm.position,
-                tool_orientation=arm.orientation,
+                tool_position=arm.pose.position,
+                tool_orientation=arm.pose.orientation,
                 tool_twist=arm.twist,
                 reference_twist=self._admitted.twist,
                 nearest_obstacle="",
@@ -279,7 +280,9 @@ class RosRobot(Service):
                 contacts=(),
                 stop=self._supervision.stop,
                 limited=self._admitted.names,
-                region_distance_m=self._limits.clearance_m(arm.position, arm.orientation),
+                region_distance_m=self._fence.clearance_m(arm.pose)
+                if self._fence.regions
+                else None,
                 command_age_s=None if age_ns is None else max(age_ns / _NS_PER_S, 0.0),
             ),
             self._origin if following else None,

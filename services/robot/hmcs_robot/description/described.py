@@ -10,17 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.chain import UNITS, Chain, chain_of
+from hmcs.arms.elements import Mistake
+from hmcs.arms.tools import check_joints, only_tool_link
+from hmcs.arms.urdf import Urdf, read_urdf, told
 from hmcs.arrays import Array
 from hmcs.errors import UserError
-from hmcs_robot.description.chain import UNITS, Chain, chain_of
-from hmcs_robot.description.elements import Mistake
 from hmcs_robot.description.meshes import READ, MeshFiles, unusable
 from hmcs_robot.description.prepared import assumed_masses, prepared
-from hmcs_robot.description.urdf import Urdf, UrdfError, read_urdf, told
 from hmcs_robot.robots import JointPositions, RobotModel
 
-FEWEST_JOINTS = 6
-"""A tool is commanded in six directions."""
 _POSTURES = 512
 """Among which the home of an arm without one is looked for."""
 _AROUND_MIDDLE = 0.6
@@ -113,50 +112,7 @@ def describe(model: RobotModel) -> DescribedArm:
 
 def check_follows(arm: DescribedArm) -> None:
     """Raise UrdfError for an arm that cannot follow a tool's velocity in every direction."""
-    names, base = arm.chain.joint_names, arm.model.base_link or arm.urdf.root
-    if len(names) < FEWEST_JOINTS:
-        raise UrdfError(
-            f"{arm.urdf.file}:{arm.urdf.links[arm.tool_link]}: between {base!r} and "
-            f"{arm.tool_link!r} there are {len(names)} joints that move ({', '.join(names)}), "
-            f"expected {FEWEST_JOINTS} or more: a tool is commanded in six directions. Choose "
-            "another tool_link or base_link"
-        )
-
-
-def tool_links(urdf: Urdf) -> tuple[str, ...]:
-    """Return the links that may be a tool: with enough joints above, and nothing below or a name
-    that tools have.
-    """
-    parents = {joint.parent for joint in urdf.joints.values()}
-    candidates = []
-    for link in urdf.links:
-        usual = any(part in link.lower() for part in ("tool", "tcp", "ee_link", "flange", "grasp"))
-        if link in parents and not usual:
-            continue
-        try:
-            chain = chain_of(urdf, link)
-        except UrdfError:
-            continue
-        if len(chain.joint_names) < FEWEST_JOINTS:
-            continue
-        candidates.append((not usual, link))
-    return tuple(link for _, link in sorted(candidates, key=lambda each: each[0]))
-
-
-def only_tool_link(urdf: Urdf) -> str:
-    """Return the one link that may be the tool; raises UrdfError where there are more, or none."""
-    candidates = tool_links(urdf)
-    if len(candidates) == 1:
-        return candidates[0]
-    if not candidates:
-        raise UrdfError(
-            f"{urdf.file}: no link hangs on six or more joints that move (revolute, continuous or "
-            "prismatic, one after another): expected an arm. Name another link as tool_link to "
-            "read what is in its way"
-        )
-    raise UrdfError(
-        f"{urdf.file}: which link is the tool? Give tool_link, one of: {', '.join(candidates)}"
-    )
+    check_joints(arm.urdf, arm.chain, arm.tool_link, arm.model.base_link)
 
 
 def posture(urdf: Path, chain: Chain, what: str, given: JointPositions) -> Array:

@@ -15,12 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.arrays import Array, shortened
-from hmcs.fixtures.regions.closest import cross
-from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
-from hmcs.motion import quaternions
-from hmcs_robot.driver import ArmState, Pose
-from hmcs_robot.limits import (
+from hmcs.arms.limits import (
     Limits,
     bounds_of,
     speed_scale,
@@ -29,6 +24,11 @@ from hmcs_robot.limits import (
     within_speed,
     within_walls,
 )
+from hmcs.arms.state import ArmState, Pose
+from hmcs.arrays import Array, shortened
+from hmcs.fixtures.regions.closest import cross
+from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
+from hmcs.motion import quaternions
 
 
 @dataclass(frozen=True)

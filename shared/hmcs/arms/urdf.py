@@ -13,9 +13,9 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
+from hmcs.arms.elements import Joint, Mistake, Reader, shortened_list
 from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
-from hmcs_robot.description.elements import Joint, Mistake, Reader, shortened_list
 
 MOST_BYTES = 16_000_000
 MOST_TOLD = 20
