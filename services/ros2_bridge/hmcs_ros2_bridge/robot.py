@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from dataclasses import replace
+from statistics import median
 
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import (
@@ -46,6 +48,8 @@ from hmcs_ros2_bridge.tool_limits import fence_of, tool_limits_of
 
 OTHERS_EVERY_S = 0.5
 """How often other publishers on the command's topic are looked for."""
+WAITS_KEPT = 1000
+"""Commands of which it is kept how long they waited."""
 _NS_PER_S = 1_000_000_000
 
 
@@ -76,6 +80,7 @@ class RosRobot(Service):
         self._supervision = Supervision()
         self._origin: Origin | None = None
         self._command_ns: int | None = None
+        self._waits_ns: deque[int] = deque(maxlen=WAITS_KEPT)
         self._pairings = Pairings()
         self._trouble = "nothing was heard of the arm yet"
         self._others = 0
@@ -104,8 +109,12 @@ class RosRobot(Service):
         return True, f"standing: {self._supervision.stop}"
 
     def facts(self) -> dict[str, str]:
-        """Return which robot this is."""
+        """Return which robot this is, and how long half of the commands wait at most until the arm
+        is told.
+        """
+        waits_ns = median(self._waits_ns) if self._waits_ns else 0
         return {
+            "commands_wait_ms": f"{waits_ns / 1e6:.3f}",
             "robot": self._task.robot.name,
             "task": self._task.name,
             "states": ", ".join(state.name for state in self._task.states),
@@ -143,6 +152,7 @@ class RosRobot(Service):
         else:
             self._origin, self._command_ns = received.envelope.origin, received.received_ns
             self._supervise(now_ns)
+            self._waits_ns.append(time.monotonic_ns() - received.received_ns)
             self._move(now_ns)
 
     def _on_pairing(self, received: Received[Pairing]) -> None:

@@ -118,10 +118,17 @@ def message_type(kind: str) -> Any:
 def filled(kind: Any, fields: dict[str, Any]) -> Any:
     """Return a message of a class with the given fields; the others stay at their defaults."""
     message = kind()
-    kinds = _kinds_of(kind)
-    for name, value in fields.items():
-        setattr(message, name, _value(kinds[name], value))
+    _fill(message, fields)
     return message
+
+
+def _fill(message: Any, fields: dict[str, Any]) -> None:
+    for name, value in fields.items():
+        if isinstance(value, dict):
+            # The message within is there already: another one would take as long again to make.
+            _fill(getattr(message, name), value)
+        else:
+            setattr(message, name, _value(_kinds_of(type(message))[name], value))
 
 
 @cache
@@ -131,8 +138,6 @@ def _kinds_of(kind: Any) -> dict[str, str]:
 
 
 def _value(kind: str, value: Any) -> Any:
-    if isinstance(value, dict):
-        return filled(message_type(kind), value)
     if kind.startswith("sequence<") and "/" in kind:
         element = message_type(kind.removeprefix("sequence<").removesuffix(">"))
         return [filled(element, each) for each in value]

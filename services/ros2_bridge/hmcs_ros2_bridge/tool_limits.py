@@ -49,17 +49,18 @@ def admitted(
 
     A command that is to be zero, a stop, is not held back by accelerations.
     """
-    if not np.any(twist):
+    if not twist.any():
         return Limited(np.zeros(6), ())
     slow = within_speed(twist, limits)
     eased = within_acceleration(slow, before, limits, elapsed_s)
     # Walls and regions come last: they may brake harder.
     walled = within_walls(eased, tool.position, limits)
-    clear = within_planes(walled, fence.planes(tool), limits)
-    stages = (twist, slow, eased, walled, clear)
+    clear = within_planes(walled, fence.planes(tool), limits) if fence.regions else walled
+    # As lists: to compare arrays of six takes longer than all of the above.
+    stages = [stage.tolist() for stage in (twist, slow, eased, walled, clear)]
     names = ("speed", "acceleration", "workspace", "region")
     shaped = zip(names, stages, stages[1:], strict=False)
-    return Limited(clear, tuple(n for n, one, other in shaped if (one != other).any()))
+    return Limited(clear, tuple(name for name, one, other in shaped if one != other))
 
 
 def tool_limits_of(

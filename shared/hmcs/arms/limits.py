@@ -78,8 +78,10 @@ def within_acceleration(
 
 def within_walls(twist: Array, position: Array, limits: ToolLimits) -> Array:
     """Return `twist` (6,) of a tool at `position`, slowed where it leads out through a wall."""
-    lower, upper = limits.braking_per_s * _room(position, limits, limits.wall_margin_m)
-    return np.concatenate([np.clip(twist[:3], -lower, upper), twist[3:]])
+    lower, upper = _room(position, limits, limits.wall_margin_m)
+    braking_per_s = limits.braking_per_s
+    slowed = np.minimum(np.maximum(twist[:3], -braking_per_s * lower), braking_per_s * upper)
+    return np.concatenate([slowed, twist[3:]])
 
 
 def within_planes(twist: Array, planes: Candidates, limits: ToolLimits) -> Array:
@@ -90,10 +92,11 @@ def within_planes(twist: Array, planes: Candidates, limits: ToolLimits) -> Array
     return KeepOut(planes, 1.0 / limits.braking_per_s).admitted(twist)
 
 
-def _room(position: Array, limits: ToolLimits, margin_m: float) -> Array:
-    """Return the distance to the lower and the upper walls, m, shape (2, 3), never negative."""
-    room = np.stack([position - limits.workspace_lower_m, limits.workspace_upper_m - position])
-    return np.maximum(room - margin_m, 0.0)
+def _room(position: Array, limits: ToolLimits, margin_m: float) -> tuple[Array, Array]:
+    """Return the distance to the lower and the upper walls, m, (3,) each, never negative."""
+    below = position - limits.workspace_lower_m - margin_m
+    above = limits.workspace_upper_m - position - margin_m
+    return np.maximum(below, 0.0), np.maximum(above, 0.0)
 
 
 class Bounds(NamedTuple):
