@@ -11,6 +11,7 @@ from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.motion.quaternions import between
 from hmcs_ros2_bridge.fields import NonsenseError, check_frame, pose_in
+from hmcs_ros2_bridge.frames import Frames
 
 MOST_JOINTS = 64
 LONGEST_URDF = 1_000_000
@@ -69,6 +70,16 @@ def report_of(message: Any, heard_ns: int, before: ArmReport | None, frame: str)
     return _after(before, pose, stamp_s_of(message), heard_ns, np.zeros(0))
 
 
+def report_of_frame(
+    frames: Frames, tool: str, heard_ns: int, before: ArmReport | None, base: str
+) -> ArmReport | None:
+    """Return where transforms have the tool; None where they say nothing new of it."""
+    found = frames.pose(tool, base)
+    if found is None or (before is not None and found[1] <= before.stamp_s):
+        return None
+    return _after(before, *found, heard_ns, np.zeros(0))
+
+
 def report_of_joints(
     message: Any, joints: Joints, heard_ns: int, before: ArmReport | None, chain: Chain
 ) -> ArmReport:
@@ -103,9 +114,12 @@ def _after(
 class ArmReports:
     """The newest reports of an arm; taken on ROS' thread, read in the loop."""
 
-    def __init__(self, frame: str, *, by_joints: bool = False) -> None:
-        """`by_joints`: the tool is where the joints put it, once the `chain` is known."""
-        self._frame = frame
+    def __init__(self, frame: str, *, by_joints: bool = False, tool_frame: str = "") -> None:
+        """`by_joints`: the tool is where the joints put it, once the `chain` is known; `tool_frame`
+        is looked for in transforms.
+        """
+        self._frame, self._tool_frame = frame, tool_frame
+        self._frames = Frames()
         self._by_joints = by_joints
         self._waiting = False
         self.chain: Chain | None = None
@@ -149,6 +163,20 @@ class ArmReports:
             self._refuse(f"the robot {error}")
             return False
         self.joints, self.newest = joints, report
+        return self._to_be_handled()
+
+    def take_transforms(self, message: Any, heard_ns: int, *, stay: bool) -> bool:
+        """Take in transforms; return whether they say where the tool is, to be handled."""
+        try:
+            self._frames.take(message, stays=stay)
+        except NonsenseError as error:
+            self._refuse(f"a transform {error}")
+            return False
+        tool, before = self._tool_frame, self.newest
+        report = report_of_frame(self._frames, tool, heard_ns, before, self._frame)
+        if report is None:
+            return False
+        self.newest = report
         return self._to_be_handled()
 
     def take_description(self, message: Any) -> None:

@@ -36,9 +36,10 @@ class RosRobotSettings(ServiceSettings):
     trajectory_s: float = Field(default=0.05, gt=0.0, le=1.0)
     """Of `joint_trajectory`: each point is to be reached after so long. An arm that is told nothing
     more stands after it."""
-    tool_pose_from: Literal["topic", "joints"] | None = None
-    """Where the tool is: from `tool_pose_topic`, or from the joints and the URDF. By default from
-    the topic, and from the joints where joints are commanded."""
+    tool_pose_from: Literal["topic", "joints", "tf"] | None = None
+    """Where the tool is: from `tool_pose_topic`, from the joints and the URDF, or from /tf and
+    /tf_static, for which ROS' tf2_msgs is needed. By default from the topic, and from the joints
+    where joints are commanded."""
     tool_pose_topic: str = "/tool_pose"
     """PoseStamped of the tool, in `base_frame`."""
     joint_states_topic: str = "/joint_states"
@@ -49,8 +50,8 @@ class RosRobotSettings(ServiceSettings):
     urdf: Path | None = None
     """The arm's URDF where it is neither the task's nor published."""
     tool_link: str = ""
-    """Link of the URDF whose frame is the tool frame; by default the task's, or the only one that
-    can be it."""
+    """Link of the URDF, or frame of /tf, that is the tool frame; by default the task's, or the only
+    link that can be it."""
     base_frame: str = Field(default="base_link", min_length=1)
     """Of the robot in ROS: commands are given and poses expected in it. Where the URDF has a link
     of this name, joints count from it on."""
@@ -97,4 +98,10 @@ class RosRobotSettings(ServiceSettings):
                 f"tool_pose_from is {self.tool_pose_from!r}, and a command of the kind "
                 f"{self.command} needs joints: leave it out"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _tool_frame_is_named(self) -> Self:
+        if self.pose_from == "tf" and not self.tool_link:
+            raise ValueError("tool_pose_from is tf: name the tool's frame as tool_link")
         return self

@@ -21,6 +21,10 @@ Profile = Literal["sensor", "reliable", "latched"]
 `latched`: reliable, and a late subscriber gets the last one."""
 
 
+_LATCHED_HEARD = 100
+"""What several publishers have latched comes at once; none of it may be lost."""
+
+
 class Topic(NamedTuple):
     """A topic and the type of its messages."""
 
@@ -84,7 +88,8 @@ class Node:
     def subscribe(self, topic: Topic, handler: Callable[[Any], None]) -> None:
         """Call `handler` with every message of a topic, on the thread of the node."""
         kind = message_type(topic.kind)
-        self._node.create_subscription(kind, topic.name, handler, _qos(topic.profile))
+        qos = _qos(topic.profile, _LATCHED_HEARD)
+        self._node.create_subscription(kind, topic.name, handler, qos)
 
     def close(self) -> None:
         """Leave ROS."""
@@ -123,12 +128,13 @@ def filled(kind: Any, fields: dict[str, Any]) -> Any:
 
 
 def _fill(message: Any, fields: dict[str, Any]) -> None:
+    kind: Any = type(message)
     for name, value in fields.items():
         if isinstance(value, dict):
             # The message within is there already: another one would take as long again to make.
             _fill(getattr(message, name), value)
         else:
-            setattr(message, name, _value(_kinds_of(type(message))[name], value))
+            setattr(message, name, _value(_kinds_of(kind)[name], value))
 
 
 @cache
@@ -144,7 +150,7 @@ def _value(kind: str, value: Any) -> Any:
     return value
 
 
-def _qos(profile: Profile) -> Any:
+def _qos(profile: Profile, latched: int = 1) -> Any:
     qos = module("rclpy.qos")
     if profile == "sensor":
         return qos.QoSProfile(
@@ -153,5 +159,5 @@ def _qos(profile: Profile) -> Any:
             durability=qos.DurabilityPolicy.VOLATILE,
         )
     if profile == "latched":
-        return qos.QoSProfile(depth=1, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
+        return qos.QoSProfile(depth=latched, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
     return qos.QoSProfile(depth=10)

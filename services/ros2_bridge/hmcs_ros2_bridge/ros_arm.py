@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import time
 from collections.abc import Callable
@@ -26,6 +27,13 @@ from hmcs_ros2_bridge.ros import Node, Topic
 _LONGEST_STEP_S = 0.1
 """After a longer time the arm is led on as if it had been so long."""
 _NS_PER_S = 1_000_000_000
+TF = Topic("/tf", "tf2_msgs/TFMessage", "reliable")
+TF_STATIC = Topic("/tf_static", "tf2_msgs/TFMessage", "latched")
+_NO_TF = (
+    "tool_pose_from is tf, and transforms cannot be read ({reason}): there is no wheel of "
+    "tf2_msgs. Use the Python of an installed ROS 2 after `source "
+    "/opt/ros/DISTRIBUTION/setup.bash`, or choose --tool-pose-from joints or topic"
+)
 _SILENT = Led(np.zeros(6), (), None)
 
 
@@ -47,7 +55,9 @@ class RosArm:
         self._settings, self._task, self._log = settings, task, log
         self._limits, self._fence = limits, fence
         by_joints = settings.pose_from == "joints"
-        self.reports = ArmReports(settings.base_frame, by_joints=by_joints)
+        self.reports = ArmReports(
+            settings.base_frame, by_joints=by_joints, tool_frame=settings.tool_link
+        )
         topic = settings.robot_description_topic
         self._no_chain = (
             f"nothing was heard on {topic}: give --urdf, or start a robot_state_publisher"
@@ -63,6 +73,8 @@ class RosArm:
         self.led = _SILENT
         """What it was told last."""
         self._led_ns = time.monotonic_ns()
+        if settings.pose_from == "tf":
+            check_transforms()
         self._node = Node(settings.node, settings.ros_args)
         self._commands = self._node.publisher(
             Topic(settings.commanded_topic, MESSAGES[settings.command], "reliable")
@@ -88,6 +100,10 @@ class RosArm:
         if settings.pose_from == "topic":
             pose = Topic(settings.tool_pose_topic, "geometry_msgs/PoseStamped", "sensor")
             node.subscribe(pose, partial(report, self.reports.take_pose))
+        elif settings.pose_from == "tf":
+            take = self.reports.take_transforms
+            node.subscribe(TF, partial(report, partial(take, stay=False)))
+            node.subscribe(TF_STATIC, partial(report, partial(take, stay=True)))
         joints = Topic(settings.joint_states_topic, "sensor_msgs/JointState", "sensor")
         node.subscribe(joints, partial(report, self.reports.take_joints))
         looks = Topic(settings.robot_description_topic, "std_msgs/String", "latched")
@@ -131,6 +147,11 @@ class RosArm:
     def _expected(self) -> str:
         if self._settings.pose_from == "joints":
             return f"a JointState of its joints on {self._settings.joint_states_topic}"
+        if self._settings.pose_from == "tf":
+            return (
+                f"transforms from {self._settings.base_frame} to {self._settings.tool_link} on "
+                f"{TF.name} and {TF_STATIC.name}"
+            )
         return f"a PoseStamped on {self._settings.tool_pose_topic}"
 
     def _tell(self, led: Led, now_ns: int) -> None:
@@ -156,3 +177,11 @@ class RosArm:
         self.reports.chain, self._no_chain = chain, ""
         if chain.assumed:
             self._log.warning(told(urdf.file, chain.assumed))
+
+
+def check_transforms() -> None:
+    """Raise UserError where transforms of ROS cannot be read here."""
+    try:
+        importlib.import_module("tf2_msgs.msg")
+    except ImportError as error:
+        raise UserError(_NO_TF.format(reason=error)) from error
