@@ -66,9 +66,15 @@ def test_an_arm_led_by_its_joints_follows_and_is_stopped_where_it_falls_silent(
     stack.until(lambda: driver.states[-1].stop == "silent_arm")
     driver.states.clear()
     controller = start_joint_controller(stack, kind, start)
-    stack.until(lambda: len(driver.states) > 50 and stack.health(robot).healthy)
+    begin = TASK.robot.tool_start_m
+
+    def heard_anew() -> bool:
+        return bool(np.allclose(driver.states[-1].tool_position, begin, atol=1e-3))
+
+    stack.until(lambda: driver.states and heard_anew() and stack.health(robot).healthy)
+    stack.elapse(0.3)
     assert all(state.stop != "none" for state in driver.states)
-    np.testing.assert_allclose(driver.states[-1].tool_position, TASK.robot.tool_start_m, atol=1e-3)
+    assert heard_anew(), "it is not moved back to where it was"
     driver.until_following()
     assert controller.running, controller.exit_code
 
