@@ -30,6 +30,7 @@ Stop = Literal[
     "second_writer",
     "not_paired",
     "late_tick",
+    "silent_arm",
     "collision",
     "asked",
 ]
@@ -38,11 +39,12 @@ _LASTING: tuple[Stop, ...] = (
     "refused_command",
     "not_paired",
     "late_tick",
+    "silent_arm",
     "collision",
     "asked",
 )
 """Stops that stay the reason when the commands go stale."""
-AT_ONCE: tuple[Stop, ...] = ("collision", "late_tick")
+AT_ONCE: tuple[Stop, ...] = ("collision", "late_tick", "silent_arm")
 """Stops as hard as the arm can brake; all others are within its acceleration limits."""
 ASKED_TOLD_NS = 500_000_000
 """So long at least a stop that was asked for stays the reason, also where nobody drives: who plays
@@ -166,7 +168,7 @@ def stopped(now: Supervision) -> Supervision:
 
 def silent(now: Supervision) -> Supervision:
     """Return the supervision while the arm itself is not heard, so that nothing may move it."""
-    return _halt(now, "late_tick")
+    return _halt(now, "silent_arm")
 
 
 def unpaired(now: Supervision, writer: Writer) -> Supervision:

@@ -14,6 +14,7 @@ from hmcs.supervision import (
     Verdict,
     accept,
     heard,
+    silent,
     stopped,
     tick,
     unpaired,
@@ -219,6 +220,20 @@ def test_a_late_control_tick_is_a_stop_that_only_a_new_engage_ends() -> None:
     assert now.stop == "late_tick"
     now, _ = accept(now, Order("a", TWIST, 100 * MS, True, 103 * MS), 103 * MS, patient)
     assert tick(now, (), 104 * MS, patient).stop == "late_tick"
+
+
+def test_a_silent_arm_stands_until_it_is_heard_and_the_operator_takes_hold_again() -> None:
+    story = Story()
+    story.engage()
+    story.now = silent(story.now)
+    assert story.tick(1) == "silent_arm"
+    assert not story.now.twist.any()
+    assert story.tick(101) == "silent_arm", "also once its commands are stale"
+    story.order(102, True)
+    assert story.tick(103) == "silent_arm"
+    story.order(104, False)
+    story.order(105, True)
+    assert story.tick(106) == "none"
 
 
 def test_a_writer_that_drives_another_robot_stops_this_one_and_others_do_not() -> None:

@@ -17,67 +17,36 @@ pytest.importorskip("rclpy", reason="needs ROS 2: hmcs-ros2-bridge[ros], or one 
 from hmcs.bus.messages import (
     Ask,
     Belief,
-    Command,
     FixtureState,
     Motion,
     RobotState,
     Step,
     StopRequest,
 )
-from hmcs.bus.session import Bus, Received, RequestRefusedError
+from hmcs.bus.session import RequestRefusedError
 from hmcs.bus.verbs import LOOKS
 from hmcs_local.processes import StackProcess
 from hmcs_ros2_bridge.fields import twist_in
 from hmcs_ros2_bridge.ros import Topic
 from hmcs_ros2_bridge.service import TOPICS
-from support.ros_cell import Listener, RosOperator, ros_stack, start_robot, start_servo
+from support.ros_cell import (
+    SPEED,
+    Driver,
+    Listener,
+    RosOperator,
+    ros_stack,
+    start_robot,
+    start_servo,
+)
 from support.stack import Stack
 
 COMMANDS = Topic("/servo_node/delta_twist_cmds", "geometry_msgs/TwistStamped", "reliable")
-SPEED = 0.05
-VALID_NS = 500_000_000
 
 
 @pytest.fixture
 def stack(tmp_path: Path) -> Iterator[Stack]:
     with ros_stack(tmp_path) as stack:
         yield stack
-
-
-class Driver:
-    """Commands on the bus as a fixture controller gives them, and what the robot says."""
-
-    def __init__(self, stack: Stack) -> None:
-        self.stack = stack
-        self.bus: Bus = stack.open_bus("fixture_controller", "fixture")
-        self.states: list[RobotState] = []
-        self.engaged, self.twist, self.gives = False, np.zeros(6), True
-        self._commands = self.bus.publisher(Command, self.bus.keys.command)
-        self.bus.subscribe(RobotState, self.bus.keys.robot_state, self._heard)
-        self.bus.every(0.01, self._give)
-        stack.watch(self.bus)
-
-    def until_following(self) -> None:
-        """Let go, take hold, and wait until the robot moves."""
-        self.engaged = False
-        self.stack.until(lambda: self._newest_stop() == "disengaged")
-        self.engaged = True
-        self.stack.until(lambda: self._newest_stop() == "none" and self.moves())
-
-    def moves(self) -> bool:
-        return float(np.linalg.norm(self.states[-1].tool_twist[:3])) > 0.5 * SPEED
-
-    def _newest_stop(self) -> str:
-        return self.states[-1].stop if self.states else ""
-
-    def _heard(self, received: Received[RobotState]) -> None:
-        self.states.append(received.body)
-
-    def _give(self) -> None:
-        if self.gives:
-            self._commands.put(
-                Command(twist=self.twist, valid_for_ns=VALID_NS, engaged=self.engaged)
-            )
 
 
 @pytest.fixture
@@ -104,7 +73,7 @@ def test_a_robot_killed_in_motion_is_stopped_and_resumes_only_when_a_person_does
     stack.until(lambda: sent)
 
     servo.send(signal.SIGKILL)
-    stack.until(lambda: driver.states[-1].stop == "late_tick")
+    stack.until(lambda: driver.states[-1].stop == "silent_arm")
     stack.until(lambda: not np.any(twist_in(sent[-1].twist)))
     assert "silent" in stack.health(robot).detail
 

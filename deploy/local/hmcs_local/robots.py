@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hmcs.arms.tools import tool_links
 from hmcs.errors import UserError
 from hmcs.shown import plain
 from hmcs.task import Task, load_task
@@ -18,7 +19,6 @@ from hmcs_robot.description.described import (
     check_follows,
     describe,
     joint_positions_text,
-    tool_links,
 )
 from hmcs_robot.description.picture import draw_arm
 from hmcs_robot.robots import ROBOTS, RobotModel, model_of, ros_package_path

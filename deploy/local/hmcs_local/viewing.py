@@ -41,11 +41,18 @@ def show_in_rerun(file: Path, console: Console) -> None:
     stream.disconnect()
 
 
-def save_for_rerun(file: Path, target: Path, console: Console) -> None:
-    """Write a recording as a file that Rerun opens; UserError where that cannot be."""
+def check_save_place(target: Path | None) -> None:
+    """Raise UserError for a file that Rerun would not open, or that cannot be written there."""
+    if target is None:
+        return
     if target.suffix != SUFFIX:
         raise UserError(f"--save {target}: Rerun opens files that end in {SUFFIX}: name it so")
     check_file_place(target, "--save")
+
+
+def save_for_rerun(file: Path, target: Path, console: Console) -> None:
+    """Write a recording as a file that Rerun opens; UserError where that cannot be."""
+    check_save_place(target)
     content = read(file)
     with progress_shown("going over it") as update:
         data, notes = rerun_file(content, update)

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hmcs.arms.state import Pose
 from hmcs.errors import UserError
 from hmcs.task import check_task, load_task
 from hmcs_local.new_task import PLACES, PLANES, STATES, task_name_of, write_new_task
-from hmcs_robot.driver import Pose
 from hmcs_robot.set_up import simulated
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation

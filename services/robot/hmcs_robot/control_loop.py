@@ -11,6 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.control import Following, JointCommand, Standing, Tuning, follow, stand
+from hmcs.arms.fence import Fence
+from hmcs.arms.limits import Limits
 from hmcs.supervision import (
     AT_ONCE,
     Policy,
@@ -22,10 +25,7 @@ from hmcs.supervision import (
     unpaired,
 )
 from hmcs_robot.channel import Numbered, Request, SignOfLife, Snapshot, StopAsked
-from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow, stand
 from hmcs_robot.driver import ArmDriver
-from hmcs_robot.fence import Fence
-from hmcs_robot.limits import Limits
 
 STILL_M_S = 1e-4
 """A reference slower than this, m/s and rad/s, has come to a stand."""

@@ -16,6 +16,7 @@ import socket
 import sys
 import time
 
+from hmcs.arms.fence import Fence
 from hmcs.errors import UserError
 from hmcs.fixtures.regions.tool_shape import tool_shape_of
 from hmcs.fixtures.regions.workspace import regions_of
@@ -23,7 +24,6 @@ from hmcs.task import Task, load_task
 from hmcs_robot.channel import Channel, Closed, pack_snapshot, requests
 from hmcs_robot.control_loop import ControlLoop, Rules
 from hmcs_robot.driver import ArmDriver
-from hmcs_robot.fence import Fence
 from hmcs_robot.set_up import limits_of, policy_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings
 

@@ -12,10 +12,10 @@ from collections.abc import Collection, Iterable
 from importlib.metadata import entry_points
 from typing import NamedTuple, Protocol
 
+from hmcs.arms.state import JointLimits
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle
-from hmcs_robot.driver import JointLimits
 from hmcs_robot.kinematics import Kinematics
 from hmcs_robot.robots import RobotModel
 

@@ -6,11 +6,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from hmcs.arms.inverses import FULL, inverse_of, smallest_singular_value
+from hmcs.arms.state import JointLimits, Pose
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
-from hmcs_robot.driver import JointLimits, Pose
-from hmcs_robot.inverses import FULL, inverse_of, smallest_singular_value
 
 _ACCURACY_M = 1e-6
 _ITERATIONS = 150

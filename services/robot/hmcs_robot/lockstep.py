@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmcs.arms.control import JointCommand, Standing, follow
 from hmcs.arrays import Array
 from hmcs.task import Task
-from hmcs_robot.control import JointCommand, Standing, follow
 from hmcs_robot.engine import AUTO
 from hmcs_robot.set_up import limits_of, simulated, tuning_of
 from hmcs_robot.settings import RobotSettings

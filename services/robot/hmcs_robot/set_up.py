@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmcs.arms.control import Tuning
+from hmcs.arms.limits import Limits
+from hmcs.arms.state import Pose
 from hmcs.supervision import Policy
 from hmcs.task import Task
-from hmcs_robot.control import Tuning
-from hmcs_robot.driver import ArmDriver, Pose
-from hmcs_robot.limits import Limits
+from hmcs_robot.driver import ArmDriver
 from hmcs_robot.robots import model_of
 from hmcs_robot.settings import RobotSettings
 from hmcs_robot.simulation import Scene, Simulation

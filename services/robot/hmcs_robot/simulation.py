@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.state import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
@@ -19,7 +20,6 @@ from hmcs_robot.description.described import (
     describe,
     joint_positions_text,
 )
-from hmcs_robot.driver import ArmState, LinkNear, Nearest, Pose, Touch
 from hmcs_robot.engine import AUTO, Cell, engine_named
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
 from hmcs_robot.robots import RobotModel, robot_named

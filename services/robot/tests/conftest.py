@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from hmcs.arms.control import Following, JointCommand, Standing, Tuning, follow
+from hmcs.arms.limits import Limits
+from hmcs.arms.state import Pose
 from hmcs.task import Obstacle
-from hmcs_robot.control import Following, JointCommand, Standing, Tuning, follow
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import PREFERRED, Cell, Engine, engine_named
-from hmcs_robot.limits import Limits
 from hmcs_robot.robots import ROBOTS
 from hmcs_robot.simulation import Scene, Simulation
+from support.arms import limits_about
 
 PERIOD_S = 1 / 240
 STARTS = {
@@ -78,9 +79,7 @@ def bench(engine: str) -> Iterator[Callable[..., Bench]]:
         start = STARTS[robot]
         simulation = Simulation(Scene(robot, start, obstacles), PERIOD_S, engine=engine)
         made.append(simulation)
-        limits = Limits(
-            simulation.limits, 0.25, 0.5, start.position - half_m, start.position + half_m
-        )
+        limits = limits_about(simulation.limits, start.position, half_m)
         return Bench(simulation, limits)
 
     yield make

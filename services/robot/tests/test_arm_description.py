@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from hmcs.arms.urdf import read_urdf
 from hmcs_robot.arm_description import arm_description
 from hmcs_robot.description.described import describe
 from hmcs_robot.description.meshes import MeshFiles, unusable
-from hmcs_robot.description.urdf import read_urdf
 from hmcs_robot.engine import Engine
 from hmcs_robot.robots import ROBOTS
 

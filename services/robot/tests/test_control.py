@@ -8,8 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hmcs_robot.control import Following, Standing, Tuning, stand
-from hmcs_robot.inverses import Inverse
+from hmcs.arms.control import Following, Standing, Tuning, stand
+from hmcs.arms.inverses import Inverse
 from support.arms import arm, needs
 
 SPEED_TOLERANCE = 1.02

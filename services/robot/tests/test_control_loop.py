@@ -10,17 +10,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hmcs.arms.control import Tuning
+from hmcs.arms.fence import Fence
+from hmcs.arms.state import ArmState, JointLimits, Pose
 from hmcs.arrays import Array
 from hmcs.fixtures.regions.forbidden import Plane, Region, sphere
 from hmcs.fixtures.regions.tool_shape import ToolShape
 from hmcs.supervision import Order, Policy
 from hmcs_robot.arm_description import ArmDescription
 from hmcs_robot.channel import Numbered, SignOfLife, StopAsked, Unpaired
-from hmcs_robot.control import Tuning
 from hmcs_robot.control_loop import ControlLoop, Rules
-from hmcs_robot.driver import ArmState, JointLimits, Pose
-from hmcs_robot.fence import Fence
-from hmcs_robot.limits import Limits
+from support.arms import limits_about
 
 PERIOD_NS = 4_000_000
 MS = 1_000_000
@@ -86,7 +86,7 @@ class Room(NamedTuple):
 def room() -> Callable[..., Room]:
     def make(*regions: Region, tool: ToolShape | None = None) -> Room:
         arm = Gantry()
-        limits = Limits(arm.limits, 0.25, 0.5, np.full(3, -5.0), np.full(3, 5.0))
+        limits = limits_about(arm.limits, np.zeros(3), 5.0)
         fence = Fence(regions, tool or ToolShape.ball(0.0), 0.1)
         return Room(arm, ControlLoop(arm, Rules(limits, Tuning(), Policy(), fence, PERIOD_NS), 0))
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from hmcs.arms.chain import chain_of
+from hmcs.arms.tools import tool_links
+from hmcs.arms.urdf import UrdfError, read_urdf
 from hmcs.errors import UserError
-from hmcs_robot.description.chain import chain_of
 from hmcs_robot.description.checking import reach_of
-from hmcs_robot.description.described import check_follows, describe, tool_links
-from hmcs_robot.description.urdf import UrdfError, read_urdf
+from hmcs_robot.description.described import check_follows, describe
 from hmcs_robot.robots import ROBOTS, RobotModel
 from support.urdfs import LIMIT, OFFSETS, arm, joint, link, written
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hmcs.arms.state import Pose
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion, Obstacle, load_task
 from hmcs_robot import engine as engines
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import PREFERRED, Engine, engine_named
 from hmcs_robot.lockstep import LockstepRobot
 from hmcs_robot.simulation import Scene, Simulation

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hmcs.arms.state import Pose
 from hmcs.errors import UserError
 from hmcs.motion import quaternions
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import Engine
 from hmcs_robot.kinematics import UnreachablePoseError, inverse_kinematics
 from hmcs_robot.robots import ROBOTS

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hmcs.arms.chain import pose_of
 from hmcs.task import Task, load_task
-from hmcs_robot.description.chain import pose_of
 from hmcs_robot.description.described import describe
 from hmcs_robot.kinematics import UnreachablePoseError
 from hmcs_robot.lockstep import LockstepRobot

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from hmcs.arms.control import Following, Standing, Tuning, follow
+from hmcs.arms.limits import bounds_of
+from hmcs.arms.state import Pose, Touch
 from hmcs.task import ForbiddenRegion, Obstacle
-from hmcs_robot.control import Following, Standing, Tuning, follow
-from hmcs_robot.driver import Pose, Touch
 from hmcs_robot.kinematics import UnreachablePoseError
-from hmcs_robot.limits import Limits, bounds_of
 from hmcs_robot.simulation import Scene, Simulation, StartPoseError
+from support.arms import limits_about
 
 WALL = Obstacle(name="wall", shape="box", position_m=(0.60, 0.25, 0.50), size_m=(0.3, 0.1, 0.3))
 BALL = Obstacle(name="ball", shape="sphere", position_m=(0.60, 0.0, 0.65), radius_m=0.05)
@@ -182,7 +183,7 @@ def test_links_are_kept_out_of_forbidden_regions_while_the_tool_is_far(
         else region(**AROUND_THE_ELBOW[shape])
     )
     simulation = Simulation(Scene("puma560", start, (), (around,)), period_s, engine=engine)
-    limits = Limits(simulation.limits, 0.25, 0.5, start.position - 2, start.position + 2)
+    limits = limits_about(simulation.limits, start.position, 2.0)
     carried: Following | Standing = Standing()
     nearest = []
     try:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.fixtures.regions.closest import cross
 from hmcs.task import ForbiddenRegion
 from hmcs_robot.description.following import CAUGHT_UP_PER_S, followed_by
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN, Cell, Meeting, Near
 from hmcs_robot.solids import corners_of
 from hmcs_robot_mujoco.distances import Closest, OwnPairs, Pairs

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.fixtures.regions.closest import cross
 from hmcs.motion import quaternions
 from hmcs_robot.description.described import DescribedArm
 from hmcs_robot.description.following import CAUGHT_UP_PER_S, followed_by
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import CLEAR_AT_HOME_M, JOINTS_BETWEEN
 
 BASE_LINK = -1

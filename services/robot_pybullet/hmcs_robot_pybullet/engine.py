@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import pybullet
 
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.errors import UserError
 from hmcs.task import ForbiddenRegion
 from hmcs_robot.description.described import describe
-from hmcs_robot.driver import Pose
 from hmcs_robot.engine import Cell, Meeting, Near
 from hmcs_robot_pybullet.arm import Arm
 from hmcs_robot_pybullet.bodies import add_obstacle, add_region, links_touching

@@ -6,9 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hmcs.arms.chain import Chain, pose_of
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
 from hmcs.motion.quaternions import between
 from hmcs_ros2_bridge.fields import NonsenseError, check_frame, pose_in
+from hmcs_ros2_bridge.frames import Frames
 
 MOST_JOINTS = 64
 LONGEST_URDF = 1_000_000
@@ -20,16 +23,15 @@ _LONGEST_GAP_S = 0.5
 class ArmReport(NamedTuple):
     """The tool at one moment, base frame."""
 
-    position: Array
-    """m, shape (3,)."""
-    orientation: Array
-    """x y z w, shape (4,)."""
+    pose: Pose
     twist: Array
     """m/s and rad/s, shape (6,), over the time since the report before, by the arm's own clock."""
     stamp_s: float
     """By the arm's own clock."""
     heard_ns: int
     """Arrival by this process' monotonic clock."""
+    joint_positions: Array
+    """Of the arm's chain, rad or m, shape (n,), where the pose was made of them; else (0,)."""
 
 
 class Joints(NamedTuple):
@@ -64,22 +66,64 @@ def report_of(message: Any, heard_ns: int, before: ArmReport | None, frame: str)
     Raises NonsenseError where it is in another frame, or cannot be.
     """
     check_frame(message, (frame,))
-    position, orientation = pose_in(message.pose)
-    stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+    pose = Pose(*pose_in(message.pose))
+    return _after(before, pose, stamp_s_of(message), heard_ns, np.zeros(0))
+
+
+def report_of_frame(
+    frames: Frames, tool: str, heard_ns: int, before: ArmReport | None, base: str
+) -> ArmReport | None:
+    """Return where transforms have the tool; None where they say nothing new of it."""
+    found = frames.pose(tool, base)
+    if found is None or (before is not None and found[1] <= before.stamp_s):
+        return None
+    return _after(before, *found, heard_ns, np.zeros(0))
+
+
+def report_of_joints(
+    message: Any, joints: Joints, heard_ns: int, before: ArmReport | None, chain: Chain
+) -> ArmReport:
+    """Return where the tool is at joints of a sensor_msgs/JointState, by forward kinematics.
+
+    Raises NonsenseError where one of the chain's joints is not among them.
+    """
+    missing = [name for name in chain.joint_names if name not in joints.names]
+    if missing:
+        raise NonsenseError(f"tells no position of {', '.join(missing)[:200]}")
+    positions = joints.positions[[joints.names.index(name) for name in chain.joint_names]]
+    pose = pose_of(chain.poses(positions))
+    return _after(before, pose, stamp_s_of(message), heard_ns, positions)
+
+
+def stamp_s_of(message: Any) -> float:
+    """Return the stamp of a message with a header, s."""
+    return float(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
+
+
+def _after(
+    before: ArmReport | None, pose: Pose, stamp_s: float, heard_ns: int, joint_positions: Array
+) -> ArmReport:
     moving = np.zeros(6)
     if before is not None and 0.0 < stamp_s - before.stamp_s <= _LONGEST_GAP_S:
-        turn = between(before.orientation, orientation)
-        moved = np.concatenate([position - before.position, turn])
+        turn = between(before.pose.orientation, pose.orientation)
+        moved = np.concatenate([pose.position - before.pose.position, turn])
         moving = moved / (stamp_s - before.stamp_s)
-    return ArmReport(position, orientation, moving, stamp_s, heard_ns)
+    return ArmReport(pose, moving, stamp_s, heard_ns, joint_positions)
 
 
 class ArmReports:
     """The newest reports of an arm; taken on ROS' thread, read in the loop."""
 
-    def __init__(self, frame: str) -> None:
-        self._frame = frame
+    def __init__(self, frame: str, *, by_joints: bool = False, tool_frame: str = "") -> None:
+        """`by_joints`: the tool is where the joints put it, once the `chain` is known; `tool_frame`
+        is looked for in transforms.
+        """
+        self._frame, self._tool_frame = frame, tool_frame
+        self._frames = Frames()
+        self._by_joints = by_joints
         self._waiting = False
+        self.chain: Chain | None = None
+        """The joints between base and tool; None until they are known."""
         self.newest: ArmReport | None = None
         """Of the tool."""
         self.joints = Joints((), np.zeros(0), np.zeros(0))
@@ -96,20 +140,44 @@ class ArmReports:
         except NonsenseError as error:
             self._refuse(f"the tool's pose {error}")
             return False
-        self.refusal = ""
-        waiting, self._waiting = self._waiting, True
-        return not waiting
+        return self._to_be_handled()
 
     def handled(self) -> None:
         """Note that the newest report was handled."""
         self._waiting = False
 
-    def take_joints(self, message: Any) -> None:
-        """Take in the joints."""
+    def take_joints(self, message: Any, heard_ns: int) -> bool:
+        """Take in the joints; return whether they are a report of the tool to be handled.
+
+        Where the tool is made of them, messages without any joint of the arm are those of others.
+        """
         try:
-            self.joints = joints_in(message)
+            joints = joints_in(message)
+            if not self._by_joints:
+                self.joints = joints
+                return False
+            if self.chain is None or not set(joints.names) & set(self.chain.joint_names):
+                return False
+            report = report_of_joints(message, joints, heard_ns, self.newest, self.chain)
         except NonsenseError as error:
             self._refuse(f"the robot {error}")
+            return False
+        self.joints, self.newest = joints, report
+        return self._to_be_handled()
+
+    def take_transforms(self, message: Any, heard_ns: int, *, stay: bool) -> bool:
+        """Take in transforms; return whether they say where the tool is, to be handled."""
+        try:
+            self._frames.take(message, stays=stay)
+        except NonsenseError as error:
+            self._refuse(f"a transform {error}")
+            return False
+        tool, before = self._tool_frame, self.newest
+        report = report_of_frame(self._frames, tool, heard_ns, before, self._frame)
+        if report is None:
+            return False
+        self.newest = report
+        return self._to_be_handled()
 
     def take_description(self, message: Any) -> None:
         """Take in how the robot looks."""
@@ -119,6 +187,11 @@ class ArmReports:
     def age_s(self, now_ns: int) -> float | None:
         """Return how long ago the tool was heard of; None where it never was."""
         return None if self.newest is None else (now_ns - self.newest.heard_ns) / 1e9
+
+    def _to_be_handled(self) -> bool:
+        self.refusal = ""
+        waiting, self._waiting = self._waiting, True
+        return not waiting
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1

@@ -1,20 +1,19 @@
 """`python -m hmcs_ros2_bridge.robot`: a robot of the cell whose arm a ROS 2 controller moves.
 
 On the bus it is a robot as any other, with the same rights and the same supervision; towards ROS it
-publishes a TwistStamped. It stops where its commands go stale, where the arm is silent, where
-another node publishes on its topic, and after a hang of its own; then only a deliberate re-engage
-of the operator moves it again. The arm's controller has to stop by itself where commands stay out:
-that is what holds where this process dies.
+publishes a TwistStamped, a JointTrajectory or joint velocities. It stops where its commands go
+stale, where the arm is silent, where another node publishes on its topic, and after a hang of its
+own; then only a deliberate re-engage of the operator moves it again. The arm's controller has to
+stop by itself where commands stay out: that is what holds where this process dies.
 """
 
 from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from dataclasses import replace
-from typing import Any
-
-import numpy as np
+from statistics import median
 
 from hmcs.bus.logs import RateLimitedLog
 from hmcs.bus.messages import (
@@ -43,16 +42,15 @@ from hmcs.supervision import (
     unpaired,
 )
 from hmcs.task import load_task
-from hmcs_ros2_bridge.arm_state import ArmReports
-from hmcs_ros2_bridge.fields import header, twist
 from hmcs_ros2_bridge.robot_settings import RosRobotSettings
-from hmcs_ros2_bridge.ros import Node, Topic
-from hmcs_ros2_bridge.tool_limits import Limited, tool_limits_of
+from hmcs_ros2_bridge.ros_arm import RosArm
+from hmcs_ros2_bridge.tool_limits import fence_of, tool_limits_of
 
 OTHERS_EVERY_S = 0.5
 """How often other publishers on the command's topic are looked for."""
+WAITS_KEPT = 1000
+"""Commands of which it is kept how long they waited."""
 _NS_PER_S = 1_000_000_000
-_STANDS = Limited(np.zeros(6), ())
 
 
 class RosRobot(Service):
@@ -71,6 +69,7 @@ class RosRobot(Service):
             settings.acceleration_limit_m_s2,
             settings.angular_acceleration_limit_rad_s2,
         )
+        self._fence = fence_of(self._task, self._limits)
         self._policy = Policy(
             longest_valid_ns=round(settings.command_valid_for_ms * 1e6),
             late_tick_ns=round(settings.hang_s * 1e9),
@@ -79,37 +78,26 @@ class RosRobot(Service):
         )
         self._limited_log = RateLimitedLog(log)
         self._supervision = Supervision()
-        self._admitted = _STANDS
-        self._admitted_ns = time.monotonic_ns()
         self._origin: Origin | None = None
         self._command_ns: int | None = None
+        self._waits_ns: deque[int] = deque(maxlen=WAITS_KEPT)
         self._pairings = Pairings()
         self._trouble = "nothing was heard of the arm yet"
         self._others = 0
         self._told_stop = ""
         self._states = bus.publisher(RobotState, bus.keys.robot_state)
-        self._node = Node(settings.node, settings.ros_args)
-        self._arm = ArmReports(settings.base_frame)
-        self._commands = self._node.publisher(
-            Topic(settings.command_topic, "geometry_msgs/TwistStamped", "reliable")
-        )
+        self._arm = RosArm(settings, self._task, self._limits, self._fence, log)
 
     def start(self) -> None:
         """Listen on both sides."""
-        bus, settings, node, arm = self.bus, self.settings, self._node, self._arm
+        bus = self.bus
         LOOKS.answer(bus, self._looks)
         STOP.answer(bus, self._on_stop)
         bus.subscribe(Command, bus.keys.command, self._on_command)
         bus.subscribe(StopRequest, bus.keys.stop_request, self._on_stop_request)
         bus.subscribe(Pairing, bus.keys.pairing, self._on_pairing)
-        pose = Topic(settings.tool_pose_topic, "geometry_msgs/PoseStamped", "sensor")
-        node.subscribe(pose, self._on_pose)
-        joints = Topic(settings.joint_states_topic, "sensor_msgs/JointState", "sensor")
-        node.subscribe(joints, arm.take_joints)
-        description = Topic(settings.robot_description_topic, "std_msgs/String", "latched")
-        node.subscribe(description, arm.take_description)
-        node.start()
-        bus.every(1.0 / settings.command_rate_hz, self._on_tick)
+        self._arm.start(bus.soon, self._publish_state)
+        bus.every(1.0 / self.settings.command_rate_hz, self._on_tick)
         bus.every(OTHERS_EVERY_S, self._look_for_others)
 
     def health(self) -> tuple[bool, str]:
@@ -121,20 +109,23 @@ class RosRobot(Service):
         return True, f"standing: {self._supervision.stop}"
 
     def facts(self) -> dict[str, str]:
-        """Return which robot this is."""
+        """Return which robot this is, and how long half of the commands wait at most until the arm
+        is told.
+        """
+        waits_ns = median(self._waits_ns) if self._waits_ns else 0
         return {
+            "commands_wait_ms": f"{waits_ns / 1e6:.3f}",
             "robot": self._task.robot.name,
             "task": self._task.name,
             "states": ", ".join(state.name for state in self._task.states),
-            "commands": self.settings.command_topic,
-            "refused_reports": str(self._arm.refused),
+            "commands": self.settings.commanded_topic,
+            "refused_reports": str(self._arm.reports.refused),
             "braking_per_s": f"{self._limits.braking_per_s:.2f}",
         }
 
     def close(self) -> None:
         """Bring the arm to a stand and leave ROS."""
-        self._send(_STANDS)
-        self._node.close()
+        self._arm.close()
 
     # --- commands ---------------------------------------------------------------------------------
 
@@ -161,6 +152,7 @@ class RosRobot(Service):
         else:
             self._origin, self._command_ns = received.envelope.origin, received.received_ns
             self._supervise(now_ns)
+            self._waits_ns.append(time.monotonic_ns() - received.received_ns)
             self._move(now_ns)
 
     def _on_pairing(self, received: Received[Pairing]) -> None:
@@ -207,29 +199,19 @@ class RosRobot(Service):
     def _trouble_at(self, now_ns: int) -> str:
         if self._others > 0:
             return (
-                f"{self._others} other publishers on {self.settings.command_topic}: end them, one "
-                "alone may move the arm"
+                f"{self._others} other publishers on {self.settings.commanded_topic}: end them, "
+                "one alone may move the arm"
             )
-        age_s = self._arm.age_s(now_ns)
-        if age_s is None or age_s * 1000.0 > self.settings.silent_after_ms:
-            said = self._arm.refusal or "the robot is silent"
-            return f"{said}: expected a PoseStamped on {self.settings.tool_pose_topic}"
-        return ""
+        return self._arm.trouble_at(now_ns)
 
     def _look_for_others(self) -> None:
-        self._others = self._commands.others()
+        self._others = self._arm.others()
 
     def _move(self, now_ns: int) -> None:
-        elapsed_s = min((now_ns - self._admitted_ns) / _NS_PER_S, 0.1)
-        before, arm = self._admitted.twist, self._arm.newest
-        if self._supervision.stop == "none" and arm is not None:
-            limited = self._limits.admitted(
-                self._supervision.twist, arm.position, arm.orientation, before, elapsed_s
-            )
+        if self._supervision.stop == "none":
+            self._arm.move(self._supervision.twist, now_ns)
         else:
-            limited = _STANDS
-        self._admitted, self._admitted_ns = limited, now_ns
-        self._send(limited)
+            self._arm.stand(now_ns)
         if self._supervision.stop != self._told_stop:
             self._told_stop = self._supervision.stop
             following = self._told_stop == "none"
@@ -238,63 +220,46 @@ class RosRobot(Service):
                 extra={} if following else {"reason": self._told_stop},
             )
 
-    def _send(self, limited: Limited) -> None:
-        self._commands.put(
-            {
-                "header": header(self._node.now_ns(), self.settings.base_frame),
-                "twist": twist(limited.twist),
-            }
-        )
-
-    # --- what the arm says ------------------------------------------------------------------------
-
-    def _on_pose(self, message: Any) -> None:
-        # On the thread of the node. The newest alone waits for its turn in the loop.
-        if self._arm.take_pose(message, time.monotonic_ns()):
-            self.bus.soon(self._on_report)
-
-    def _on_report(self) -> None:
-        self._arm.handled()
-        self._publish_state()
-
     def _publish_state(self) -> None:
-        arm = self._arm.newest
+        arm = self._arm.reports.newest
         if arm is None:
             return
         following = self._supervision.stop == "none"
         age_ns = None if self._command_ns is None else time.monotonic_ns() - self._command_ns
-        joints = self._arm.joints
+        joints, led = self._arm.reports.joints, self._arm.led
         self._states.put(
             RobotState(
                 robot=self._task.robot.name,
                 joint_names=joints.names,
                 joint_positions=joints.positions,
                 joint_velocities=joints.velocities,
-                tool_position=arm.position,
-                tool_orientation=arm.orientation,
+                tool_position=arm.pose.position,
+                tool_orientation=arm.pose.orientation,
                 tool_twist=arm.twist,
-                reference_twist=self._admitted.twist,
+                reference_twist=led.twist,
                 nearest_obstacle="",
                 nearest_distance_m=None,
                 contacts=(),
                 stop=self._supervision.stop,
-                limited=self._admitted.names,
-                region_distance_m=self._limits.clearance_m(arm.position, arm.orientation),
+                limited=led.names,
+                region_distance_m=self._fence.clearance_m(arm.pose)
+                if self._fence.regions
+                else None,
                 command_age_s=None if age_ns is None else max(age_ns / _NS_PER_S, 0.0),
             ),
             self._origin if following else None,
         )
 
     def _looks(self, _: Ask) -> RobotDescription:
-        if not self._arm.urdf:
+        if not self._arm.reports.urdf:
             raise RequestRefusedError(
                 f"nothing was heard on {self.settings.robot_description_topic}: start a "
                 "robot_state_publisher"
             )
         return RobotDescription(
             robot=self._task.robot.name,
-            urdf=self._arm.urdf,
-            joints=self._arm.joints.names,
+            urdf=self._arm.reports.urdf,
+            joints=self._arm.reports.joints.names,
             files={},
         )
 

@@ -21,6 +21,10 @@ Profile = Literal["sensor", "reliable", "latched"]
 `latched`: reliable, and a late subscriber gets the last one."""
 
 
+_LATCHED_HEARD = 100
+"""What several publishers have latched comes at once; none of it may be lost."""
+
+
 class Topic(NamedTuple):
     """A topic and the type of its messages."""
 
@@ -84,7 +88,8 @@ class Node:
     def subscribe(self, topic: Topic, handler: Callable[[Any], None]) -> None:
         """Call `handler` with every message of a topic, on the thread of the node."""
         kind = message_type(topic.kind)
-        self._node.create_subscription(kind, topic.name, handler, _qos(topic.profile))
+        qos = _qos(topic.profile, _LATCHED_HEARD)
+        self._node.create_subscription(kind, topic.name, handler, qos)
 
     def close(self) -> None:
         """Leave ROS."""
@@ -118,10 +123,18 @@ def message_type(kind: str) -> Any:
 def filled(kind: Any, fields: dict[str, Any]) -> Any:
     """Return a message of a class with the given fields; the others stay at their defaults."""
     message = kind()
-    kinds = _kinds_of(kind)
-    for name, value in fields.items():
-        setattr(message, name, _value(kinds[name], value))
+    _fill(message, fields)
     return message
+
+
+def _fill(message: Any, fields: dict[str, Any]) -> None:
+    kind: Any = type(message)
+    for name, value in fields.items():
+        if isinstance(value, dict):
+            # The message within is there already: another one would take as long again to make.
+            _fill(getattr(message, name), value)
+        else:
+            setattr(message, name, _value(_kinds_of(kind)[name], value))
 
 
 @cache
@@ -131,15 +144,13 @@ def _kinds_of(kind: Any) -> dict[str, str]:
 
 
 def _value(kind: str, value: Any) -> Any:
-    if isinstance(value, dict):
-        return filled(message_type(kind), value)
     if kind.startswith("sequence<") and "/" in kind:
         element = message_type(kind.removeprefix("sequence<").removesuffix(">"))
         return [filled(element, each) for each in value]
     return value
 
 
-def _qos(profile: Profile) -> Any:
+def _qos(profile: Profile, latched: int = 1) -> Any:
     qos = module("rclpy.qos")
     if profile == "sensor":
         return qos.QoSProfile(
@@ -148,5 +159,5 @@ def _qos(profile: Profile) -> Any:
             durability=qos.DurabilityPolicy.VOLATILE,
         )
     if profile == "latched":
-        return qos.QoSProfile(depth=1, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
+        return qos.QoSProfile(depth=latched, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
     return qos.QoSProfile(depth=10)

@@ -7,15 +7,21 @@ distance left overshoots unless k τ ≤ 1/e (ẋ(t) = −k x(t − τ)). So k f
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.arrays import Array, shortened
-from hmcs.fixtures.regions.forbidden import Region, clearance_m, nearby
-from hmcs.fixtures.regions.keep_out import KeepOut
-from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape, tool_shape_of
+from hmcs.arms.fence import Fence
+from hmcs.arms.limits import (
+    ToolLimits,
+    within_acceleration,
+    within_planes,
+    within_speed,
+    within_walls,
+)
+from hmcs.arms.state import Pose
+from hmcs.arrays import Array
+from hmcs.fixtures.regions.tool_shape import tool_shape_of
 from hmcs.fixtures.regions.workspace import regions_of
 from hmcs.task import Task
 
@@ -36,83 +42,49 @@ class Limited(NamedTuple):
     """Of the limits that shape it: `speed`, `workspace`, `region`, `acceleration`."""
 
 
-class ToolLimits(NamedTuple):
-    """What bounds the tool in its task."""
+def admitted(
+    twist: Array, tool: Pose, before: Array, limits: ToolLimits, fence: Fence, elapsed_s: float
+) -> Limited:
+    """Return `twist` (6,) as a tool at a pose may follow it, `elapsed_s` after `before`.
 
-    speed_m_s: float
-    angular_speed_rad_s: float
-    acceleration_m_s2: float
-    angular_acceleration_rad_s2: float
-    lower_m: Array
-    upper_m: Array
-    """Corners of the workspace, base frame, shape (3,)."""
-    regions: Sequence[Region]
-    tool: ToolShape
-    braking_per_s: float
-
-    def admitted(
-        self, twist: Array, position: Array, orientation: Array, previous: Array, elapsed_s: float
-    ) -> Limited:
-        """Return `twist` (6,) as a tool at a pose may follow it, `elapsed_s` after `previous`.
-
-        A command that is to be zero, a stop, is not held back by accelerations.
-        """
-        if not np.any(twist):
-            return Limited(np.zeros(6), ())
-        slow = _shortened(twist, self.speed_m_s, self.angular_speed_rad_s)
-        eased = previous + _shortened(
-            slow - previous,
-            self.acceleration_m_s2 * elapsed_s,
-            self.angular_acceleration_rad_s2 * elapsed_s,
-        )
-        # Walls and regions come last: they may brake harder.
-        room = np.stack([position - self.lower_m, self.upper_m - position]) - MARGIN_M
-        lower, upper = self.braking_per_s * np.maximum(room, 0.0)
-        walled = np.concatenate([np.clip(eased[:3], -lower, upper), eased[3:]])
-        clear = self._kept_out(walled, PlacedTool(self.tool, position, orientation))
-        stages = (twist, slow, eased, walled, clear)
-        names = ("speed", "acceleration", "workspace", "region")
-        shaped = zip(names, stages, stages[1:], strict=False)
-        return Limited(clear, tuple(n for n, before, after in shaped if (before != after).any()))
-
-    def clearance_m(self, position: Array, orientation: Array) -> float | None:
-        """Return how far the tool is from the nearest region; None where there is none."""
-        if not self.regions:
-            return None
-        return clearance_m(self.regions, PlacedTool(self.tool, position, orientation))
-
-    def _kept_out(self, twist: Array, tool: PlacedTool) -> Array:
-        if not self.regions:
-            return twist
-        near = nearby(self.regions, tool, self.speed_m_s / self.braking_per_s + SLOWED_M)
-        near = near._replace(distances=near.distances - MARGIN_M)
-        return KeepOut(near, 1.0 / self.braking_per_s).admitted(twist)
+    A command that is to be zero, a stop, is not held back by accelerations.
+    """
+    if not twist.any():
+        return Limited(np.zeros(6), ())
+    slow = within_speed(twist, limits)
+    eased = within_acceleration(slow, before, limits, elapsed_s)
+    # Walls and regions come last: they may brake harder.
+    walled = within_walls(eased, tool.position, limits)
+    clear = within_planes(walled, fence.planes(tool), limits) if fence.regions else walled
+    # As lists: to compare arrays of six takes longer than all of the above.
+    stages = [stage.tolist() for stage in (twist, slow, eased, walled, clear)]
+    names = ("speed", "acceleration", "workspace", "region")
+    shaped = zip(names, stages, stages[1:], strict=False)
+    return Limited(clear, tuple(name for name, one, other in shaped if one != other))
 
 
 def tool_limits_of(
     task: Task, delay_s: float, acceleration_m_s2: float, angular_acceleration_rad_s2: float
 ) -> ToolLimits:
-    """Return what bounds the tool of a task, of a robot with a delay.
-
-    Raises RegionError for a forbidden region that cannot be.
-    """
+    """Return what bounds the tool of a task, of a robot with a delay."""
     return ToolLimits(
-        task.robot.speed_limit_m_s,
-        task.robot.angular_speed_limit_rad_s,
-        acceleration_m_s2,
-        angular_acceleration_rad_s2,
-        np.array(task.workspace.lower_m),
-        np.array(task.workspace.upper_m),
-        regions_of(task),
-        tool_shape_of(task),
-        braking_for(delay_s),
+        speed_m_s=task.robot.speed_limit_m_s,
+        angular_speed_rad_s=task.robot.angular_speed_limit_rad_s,
+        workspace_lower_m=np.array(task.workspace.lower_m),
+        workspace_upper_m=np.array(task.workspace.upper_m),
+        acceleration_m_s2=acceleration_m_s2,
+        angular_acceleration_rad_s2=angular_acceleration_rad_s2,
+        braking_per_s=braking_for(delay_s),
+        wall_margin_m=MARGIN_M,
     )
+
+
+def fence_of(task: Task, limits: ToolLimits) -> Fence:
+    """Return the forbidden regions of a task; raises RegionError for one that cannot be."""
+    reach_m = limits.speed_m_s / limits.braking_per_s + SLOWED_M
+    return Fence(regions_of(task), tool_shape_of(task), reach_m, MARGIN_M)
 
 
 def braking_for(delay_s: float) -> float:
     """Return the speed allowed per distance left, 1/s, that does not overshoot after a delay."""
     return min(FASTEST_BRAKING_PER_S, 1.0 / (math.e * delay_s))
-
-
-def _shortened(twist: Array, linear: float, angular: float) -> Array:
-    return np.concatenate([shortened(twist[:3], linear), shortened(twist[3:], angular)])

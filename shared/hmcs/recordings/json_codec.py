@@ -23,7 +23,7 @@ Fields = dict[str, Any]
 
 BY_SCHEMA: dict[str, type[Message]] = {schema_of(message): message for message in MESSAGES}
 """Every message of this version of the contract by its name on the wire."""
-OLDER: dict[str, type[Message]] = {"robot_state/2": RobotState}
+OLDER: dict[str, type[Message]] = {"robot_state/2": RobotState, "robot_state/3": RobotState}
 """Messages of earlier versions that are read as those of today: what was added may be left out."""
 
 

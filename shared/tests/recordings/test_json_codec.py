@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import suppress
 from enum import Enum, auto
+from pathlib import Path
 
 import msgpack
 import numpy as np
@@ -14,10 +15,17 @@ from hypothesis import strategies as st
 
 from hmcs.bus.arrays import to_wire
 from hmcs.bus.examples import ENVELOPE, EXAMPLES
-from hmcs.bus.messages import Message, Motion, RobotDescription
+from hmcs.bus.messages import Message, Motion, RobotDescription, RobotState
 from hmcs.bus.wire import decode, encode, schema_of
-from hmcs.recordings.json_codec import NoMessageError, fields_of, json_schema_of, message_of
+from hmcs.recordings.json_codec import (
+    NoMessageError,
+    fields_of,
+    json_schema_of,
+    message_of,
+    readable_as,
+)
 
+GOLDEN = Path(__file__).parents[3] / "tests/contract/golden"
 PUBLISHED = [body for body in EXAMPLES if not isinstance(body, RobotDescription)]
 
 
@@ -27,6 +35,16 @@ def test_a_message_comes_back_from_json_as_it_was(body: Message) -> None:
     envelope, read = message_of(type(body), text)
     assert envelope == ENVELOPE
     assert fields_of(encode(read, envelope)) == fields_of(encode(body, ENVELOPE))
+
+
+@pytest.mark.parametrize("older", ["robot_state/2", "robot_state/3"])
+def test_a_recorded_message_of_an_earlier_version_opens(older: str) -> None:
+    golden = GOLDEN / f"{older.replace('/', '-')}.bin"
+    today = golden.read_bytes().replace(older.encode(), schema_of(RobotState).encode())
+    text = json.dumps(fields_of(today) | {"schema": older})
+    message_type = readable_as(older)
+    assert message_type is RobotState
+    assert message_of(message_type, text)[0] == ENVELOPE
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=3, max_size=3))

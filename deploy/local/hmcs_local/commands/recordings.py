@@ -154,7 +154,7 @@ def export(
 
 
 def view(
-    recording: Annotated[Path, typer.Argument(help="An MCAP file of the recorder.")],
+    recording: Recording,
     rerun: Annotated[
         bool, typer.Option("--rerun", help="In Rerun's viewer; needs the extra hmcs[rerun].")
     ] = False,
@@ -162,23 +162,26 @@ def view(
         Path | None,
         typer.Option(metavar="FILE.rrd", help="Write what Rerun opens, on any machine."),
     ] = None,
+    folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Show a recording in space and over time: robot, ways, beliefs, states, forces, fixture.
 
     In Foxglove it opens as it is; see `hmcs export` for a layout.
     """
-    from hmcs_local.viewing import save_for_rerun, show_in_rerun
+    from hmcs_local.recorded_files import recording_named
+    from hmcs_local.viewing import check_save_place, save_for_rerun, show_in_rerun
 
     if not rerun:
         raise UserError(
             "name a viewer: --rerun; in Foxglove the recording opens as it is, with the layout "
             "that `hmcs export` writes"
         )
-    console = Console(highlight=False, soft_wrap=True)
+    check_save_place(save)
+    file, console = recording_named(recording, folder, note), screen()
     if save is None:
-        show_in_rerun(recording, console)
+        show_in_rerun(file, console)
     else:
-        save_for_rerun(recording, save, console)
+        save_for_rerun(file, save, console)
 
 
 def replay(

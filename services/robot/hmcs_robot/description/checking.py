@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.chain import FORCES, UNITS, Chain, pose_of
+from hmcs.arms.state import Pose
 from hmcs.arrays import Array
-from hmcs_robot.description.chain import FORCES, UNITS, Chain, pose_of
 from hmcs_robot.description.described import DescribedArm
-from hmcs_robot.driver import Pose
 
 _POSTURES = 20_000
 _STEPS, _STEP_RAD_PER_M = 400, 0.3

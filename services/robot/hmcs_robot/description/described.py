@@ -9,20 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.chain import UNITS, Chain, chain_of
+from hmcs.arms.elements import Mistake
+from hmcs.arms.inverses import FEWEST, FULL, smallest_singular_value
+from hmcs.arms.tools import check_joints, only_tool_link
+from hmcs.arms.urdf import Urdf, read_urdf, told
 from hmcs.arrays import Array
 from hmcs.errors import UserError
-from hmcs_robot.description.chain import UNITS, Chain, chain_of
-from hmcs_robot.description.elements import Mistake
 from hmcs_robot.description.meshes import READ, MeshFiles, unusable
 from hmcs_robot.description.prepared import assumed_masses, prepared
-from hmcs_robot.description.urdf import Urdf, UrdfError, read_urdf, told
-from hmcs_robot.inverses import FEWEST, FULL, smallest_singular_value
 from hmcs_robot.robots import JointPositions, RobotModel
 
-_LEAST_M_PER_RAD = 0.01
-"""An arm whose tool moves less in some direction, in a comfortable posture, cannot be led."""
 _LEAST_RAD_PER_RAD = 0.01
-"""The same of its turning."""
+"""A tool that turns less about an axis, at home, does not follow a turn about it."""
 _POSTURES = 512
 """Among which the home of an arm without one is looked for."""
 _AROUND_MIDDLE = 0.6
@@ -106,22 +105,7 @@ def describe(model: RobotModel) -> DescribedArm:
 
 def check_follows(arm: DescribedArm) -> None:
     """Raise UrdfError for an arm that cannot follow its tool's velocity in every direction."""
-    names, base = arm.chain.joint_names, arm.model.base_link or arm.urdf.root
-    where = f"{arm.urdf.file}:{arm.urdf.links[arm.tool_link]}: "
-    if len(names) < FEWEST:
-        raise UrdfError(
-            f"{where}between {base!r} and {arm.tool_link!r} there are {len(names)} joints that "
-            f"move ({', '.join(names)}), expected {FEWEST} or more: a tool is led in three "
-            "directions. Choose another tool_link or base_link"
-        )
-    moves, lengths, _ = np.linalg.svd(arm.chain.jacobians(arm.home)[:3])
-    if lengths[-1] < _LEAST_M_PER_RAD:
-        along = ", ".join(f"{value:.2f}" for value in moves[:, -1])
-        raise UrdfError(
-            f"{where}the joints {', '.join(names)} do not move {arm.tool_link!r} along "
-            f"({along}) in {base!r}, so that it cannot be led in every direction: choose another "
-            "tool_link, or an arm with a joint for it"
-        )
+    check_joints(arm.urdf, arm.chain, arm.tool_link, arm.model.base_link, arm.home)
 
 
 def _not_followed(urdf: Urdf, chain: Chain, tool_link: str, home: Array) -> tuple[Mistake, ...]:
@@ -145,47 +129,6 @@ def _not_followed(urdf: Urdf, chain: Chain, tool_link: str, home: Array) -> tupl
             f"{count} joints lead link {tool_link} to every position; {what} its orientation are "
             "not followed, and it turns while it moves",
         ),
-    )
-
-
-def tool_links(urdf: Urdf) -> tuple[str, ...]:
-    """Return the links that may be a tool: with nothing below or a name that tools have.
-
-    They have six joints above them; three where no link has six.
-    """
-    return _tool_links(urdf, FULL) or _tool_links(urdf, FEWEST)
-
-
-def _tool_links(urdf: Urdf, fewest: int) -> tuple[str, ...]:
-    parents = {joint.parent for joint in urdf.joints.values()}
-    candidates = []
-    for link in urdf.links:
-        usual = any(part in link.lower() for part in ("tool", "tcp", "ee_link", "flange", "grasp"))
-        if link in parents and not usual:
-            continue
-        try:
-            chain = chain_of(urdf, link)
-        except UrdfError:
-            continue
-        if len(chain.joint_names) < fewest:
-            continue
-        candidates.append((not usual, link))
-    return tuple(link for _, link in sorted(candidates, key=lambda each: each[0]))
-
-
-def only_tool_link(urdf: Urdf) -> str:
-    """Return the one link that may be the tool; raises UrdfError where there are more, or none."""
-    candidates = tool_links(urdf)
-    if len(candidates) == 1:
-        return candidates[0]
-    if not candidates:
-        raise UrdfError(
-            f"{urdf.file}: no link hangs on three or more joints that move (revolute, continuous "
-            "or prismatic, one after another): expected an arm. Name another link as tool_link to "
-            "read what is in its way"
-        )
-    raise UrdfError(
-        f"{urdf.file}: which link is the tool? Give tool_link, one of: {', '.join(candidates)}"
     )
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hmcs.arms.chain import Chain
 from hmcs.arrays import Array
-from hmcs_robot.description.chain import Chain
 
 CAUGHT_UP_PER_S = 20.0
 """Rate at which a joint that follows another is drawn to where it belongs."""

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from hmcs_robot.description.elements import Mistake
-from hmcs_robot.description.urdf import Urdf
+from hmcs.arms.elements import Mistake
+from hmcs.arms.urdf import Urdf
 
 READ = (".stl", ".obj", ".dae")
 """Formats of meshes that every engine and the page read."""

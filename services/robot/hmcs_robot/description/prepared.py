@@ -14,10 +14,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from hmcs.arms.chain import Chain, Follower, displacement, origin_of
+from hmcs.arms.elements import MOVING, Joint, Mistake, finite_numbers
+from hmcs.arms.urdf import Urdf
 from hmcs.arrays import Array
-from hmcs_robot.description.chain import Chain, Follower, displacement, origin_of
-from hmcs_robot.description.elements import MOVING, Joint, Mistake, finite_numbers
-from hmcs_robot.description.urdf import Urdf
 
 BODY_KG, FRAME_KG = 1.0, 0.001
 """Assumed of a link without an inertia that has a shape, and of one that has none."""

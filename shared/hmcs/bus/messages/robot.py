@@ -15,7 +15,7 @@ class RobotState(Message):
     """Where the robot is and what it touches."""
 
     SCHEMA = "robot_state"
-    VERSION = 3
+    VERSION = 4
 
     robot: Name
     """Which robot, e.g. `puma560`."""
@@ -48,12 +48,13 @@ class RobotState(Message):
         "second_writer",
         "not_paired",
         "late_tick",
+        "silent_arm",
         "collision",
         "asked",
     ]
     """Why the robot stands; `none` while it follows commands, `asked` after somebody asked it to
     `stop`, `not_paired` while the fixture controller drives another robot, `late_tick` after its
-    own control loop came too late."""
+    own control loop came too late, `silent_arm` while it hears nothing of the arm it moves."""
     limited: tuple[str, ...]
     """Limits that shape the motion now, e.g. `speed`, `workspace`, `region`, `joint_3`,
     `singularity`."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hmcs.arms.state import Pose
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates, Region, clearance_m, nearby
 from hmcs.fixtures.regions.tool_shape import PlacedTool, ToolShape
-from hmcs_robot.driver import Pose
 
 
 @dataclass(frozen=True)

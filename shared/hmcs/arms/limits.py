@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.state import ArmState, JointLimits
 from hmcs.arrays import Array, shortened
 from hmcs.fixtures.regions.closest import cross
 from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
 from hmcs.fixtures.regions.keep_out import KeepOut
-from hmcs_robot.driver import ArmState, JointLimits
 
 _NOTHING = 1e-6
 """A bound approached more slowly than this (rad/s, m/s) is not approached."""
@@ -24,11 +24,10 @@ _PRESSING_M_S = 1e-4
 """A contact that closes more slowly than this counts as sliding."""
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What no command may exceed."""
+@dataclass(frozen=True, kw_only=True)
+class ToolLimits:
+    """What no command to a tool may exceed."""
 
-    joints: JointLimits
     speed_m_s: float
     angular_speed_rad_s: float
     workspace_lower_m: Array
@@ -40,12 +39,19 @@ class Limits:
     braking_per_s: float = 8.0
     """Speed allowed per distance left to a wall of the workspace or the end of a joint's range."""
     wall_margin_m: float = 0.002
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits(ToolLimits):
+    """What no command to an arm may exceed: the limits of its tool and of its joints."""
+
+    joints: JointLimits
     joint_margin_rad: float = 0.01
     link_margin_m: float = 0.001
     """Links of the arm are kept so far off forbidden regions."""
 
 
-def within_speed(twist: Array, limits: Limits) -> Array:
+def within_speed(twist: Array, limits: ToolLimits) -> Array:
     """Return `twist` (6,), its linear and its angular part each shortened to the speed limits."""
     return np.concatenate(
         [
@@ -55,7 +61,9 @@ def within_speed(twist: Array, limits: Limits) -> Array:
     )
 
 
-def within_acceleration(twist: Array, previous: Array, limits: Limits, period_s: float) -> Array:
+def within_acceleration(
+    twist: Array, previous: Array, limits: ToolLimits, period_s: float
+) -> Array:
     """Return how far towards `twist` (6,) the `previous` one may change within a period."""
     change = twist - previous
     step = np.concatenate(
@@ -68,13 +76,15 @@ def within_acceleration(twist: Array, previous: Array, limits: Limits, period_s:
     return reached
 
 
-def within_walls(twist: Array, position: Array, limits: Limits) -> Array:
+def within_walls(twist: Array, position: Array, limits: ToolLimits) -> Array:
     """Return `twist` (6,) of a tool at `position`, slowed where it leads out through a wall."""
-    lower, upper = limits.braking_per_s * _room(position, limits, limits.wall_margin_m)
-    return np.concatenate([np.clip(twist[:3], -lower, upper), twist[3:]])
+    lower, upper = _room(position, limits, limits.wall_margin_m)
+    braking_per_s = limits.braking_per_s
+    slowed = np.minimum(np.maximum(twist[:3], -braking_per_s * lower), braking_per_s * upper)
+    return np.concatenate([slowed, twist[3:]])
 
 
-def within_planes(twist: Array, planes: Candidates, limits: Limits) -> Array:
+def within_planes(twist: Array, planes: Candidates, limits: ToolLimits) -> Array:
     """Return the twist nearest to `twist` (6,) that brings no corner of the tool behind a plane.
 
     A corner approaches a plane no faster than its distance times `braking_per_s`.
@@ -82,10 +92,11 @@ def within_planes(twist: Array, planes: Candidates, limits: Limits) -> Array:
     return KeepOut(planes, 1.0 / limits.braking_per_s).admitted(twist)
 
 
-def _room(position: Array, limits: Limits, margin_m: float) -> Array:
-    """Return the distance to the lower and the upper walls, m, shape (2, 3), never negative."""
-    room = np.stack([position - limits.workspace_lower_m, limits.workspace_upper_m - position])
-    return np.maximum(room - margin_m, 0.0)
+def _room(position: Array, limits: ToolLimits, margin_m: float) -> tuple[Array, Array]:
+    """Return the distance to the lower and the upper walls, m, (3,) each, never negative."""
+    below = position - limits.workspace_lower_m - margin_m
+    above = limits.workspace_upper_m - position - margin_m
+    return np.maximum(below, 0.0), np.maximum(above, 0.0)
 
 
 class Bounds(NamedTuple):
@@ -156,7 +167,7 @@ def bounds_of(arm: ArmState, limits: Limits, planes: Candidates = NOTHING) -> Bo
     )
 
 
-def speed_scale(twist: Array, limits: Limits) -> float:
+def speed_scale(twist: Array, limits: ToolLimits) -> float:
     """Return the factor, 0 to 1, that brings `twist` (6,) within the speed limits as a whole."""
     linear, angular = float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:]))
     return 1.0 / max(1.0, linear / limits.speed_m_s, angular / limits.angular_speed_rad_s)

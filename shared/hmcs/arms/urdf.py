@@ -13,9 +13,9 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
+from hmcs.arms.elements import Joint, Mistake, Reader, shortened_list
 from hmcs.bounded_files import UnreadableFileError, read_bounded
 from hmcs.errors import UserError
-from hmcs_robot.description.elements import Joint, Mistake, Reader, shortened_list
 
 MOST_BYTES = 16_000_000
 MOST_TOLD = 20
@@ -73,6 +73,11 @@ def read_urdf(file: Path) -> Urdf:
         data = read_bounded(file, MOST_BYTES)
     except UnreadableFileError as error:
         raise UrdfError(f"{file}: {error.what}; expected a URDF file") from error
+    return urdf_in(file, data)
+
+
+def urdf_in(file: Path, data: bytes) -> Urdf:
+    """Return the description in `data`, which is said to be of `file`; raises as `read_urdf`."""
     robot, lines = _parse(file, data)
     _check_is_urdf(file, robot, lines)
     reader = Reader(lines)

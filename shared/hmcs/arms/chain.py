@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hmcs.arms.elements import MOVING, Joint, Mistake
+from hmcs.arms.state import JointLimits, Pose
+from hmcs.arms.urdf import Urdf, UrdfError, told
 from hmcs.arrays import Array
 from hmcs.motion import quaternions
-from hmcs_robot.description.elements import MOVING, Joint, Mistake
-from hmcs_robot.description.urdf import Urdf, UrdfError, told
-from hmcs_robot.driver import JointLimits, Pose
 
 ASSUMED_RANGE: Mapping[str, tuple[float, float]] = {
     "revolute": (-np.pi, np.pi),
@@ -54,7 +54,7 @@ class Segment(NamedTuple):
 
 @dataclass(frozen=True)
 class Chain:
-    """An arm of n joints. As `hmcs_robot.kinematics.Kinematics` it can be put anywhere."""
+    """An arm of n joints."""
 
     joint_names: tuple[str, ...]
     kinds: tuple[str, ...]
@@ -134,7 +134,7 @@ class Chain:
 
 
 class Posture:
-    """A chain that is put anywhere, as `hmcs_robot.kinematics.Kinematics`."""
+    """A chain that is put anywhere."""
 
     def __init__(self, chain: Chain, positions: Array) -> None:
         self._chain = chain

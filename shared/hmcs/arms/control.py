@@ -15,12 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hmcs.arrays import Array, shortened
-from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
-from hmcs.motion import quaternions
-from hmcs_robot.driver import ArmState, Pose
-from hmcs_robot.inverses import inverse_of
-from hmcs_robot.limits import (
+from hmcs.arms.inverses import inverse_of
+from hmcs.arms.limits import (
     Limits,
     bounds_of,
     speed_scale,
@@ -29,6 +25,10 @@ from hmcs_robot.limits import (
     within_speed,
     within_walls,
 )
+from hmcs.arms.state import ArmState, Pose
+from hmcs.arrays import Array, shortened
+from hmcs.fixtures.regions.forbidden import NOTHING, Candidates
+from hmcs.motion import quaternions
 
 
 @dataclass(frozen=True)
