@@ -19,7 +19,7 @@ from support.stack import Stack
 TELL_S = 0.02
 LET_GO_S = 0.1
 """So long handle and pedal are up before they are held and pressed again."""
-LONGEST_PRESS_S = 30.0
+LONGEST_PRESS_S = 5.0
 BEHIND_S = 0.08
 """The hand follows its handle so much later."""
 
@@ -51,7 +51,8 @@ class Scripted:
     def perform(self, rng: np.random.Generator, *, mark: bool) -> dict[int, str]:
         """Go once; return the state that is meant at each step.
 
-        The pedal is down until what it marks was said, which takes a movement.
+        The pedal is down until what it marks was said, which takes a movement. Nothing is returned
+        where the machine stood still for so long that the device had the hand rest: go again.
         """
         first_m = self._corners_m[0]
         corners = first_m + (self._corners_m - first_m) * rng.uniform(0.95, 1.05)
@@ -63,7 +64,9 @@ class Scripted:
         first, begins, turns = len(self.steps), list[int](), [0.0, *ends_s[:-1] + BEHIND_S]
         began_s, marked, pedal, down_s = time.monotonic(), self._marks, False, -LET_GO_S
         while (at_s := time.monotonic() - began_s) < ends_s[-1] + BEHIND_S or pedal:
-            assert at_s < ends_s[-1] + LONGEST_PRESS_S, "the pedal marks nothing"
+            if at_s > ends_s[-1] + LONGEST_PRESS_S:
+                self._tell(corners[-1], held=False)
+                return {}
             down_s = at_s if pedal else down_s
             pedal = mark and self._marks - marked < len(begins)
             up = not pedal and at_s - down_s >= LET_GO_S
