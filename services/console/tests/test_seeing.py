@@ -168,7 +168,7 @@ def test_what_a_state_has_of_its_own_is_reported(known: Model) -> None:
 
 
 def test_without_a_known_model_no_rules_are_reported() -> None:
-    assert "No recognizer" in spoken_rules.rules(None, "")
+    assert "not known" in spoken_rules.rules(None, "")
 
 
 # --- messages at a glance -------------------------------------------------------------------------

@@ -171,13 +171,13 @@ def view(
     from hmcs_local.recorded_files import recording_named
     from hmcs_local.viewing import check_save_place, save_for_rerun, show_in_rerun
 
+    check_save_place(save)
+    file, console = recording_named(recording, folder, note), screen()
     if not rerun:
         raise UserError(
             "name a viewer: --rerun; in Foxglove the recording opens as it is, with the layout "
             "that `hmcs export` writes"
         )
-    check_save_place(save)
-    file, console = recording_named(recording, folder, note), screen()
     if save is None:
         show_in_rerun(file, console)
     else:
