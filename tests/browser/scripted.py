@@ -48,14 +48,17 @@ class Scripted:
         bus.subscribe(Step, bus.keys.step, self.steps.append)
         bus.subscribe(Label, bus.keys.label, self._on_label)
 
-    def perform(self, rng: np.random.Generator, *, mark: bool) -> dict[int, str]:
-        """Go once; return the state that is meant at each step.
+    def perform(
+        self, rng: np.random.Generator, *, mark: bool, parts: int | None = None
+    ) -> dict[int, str]:
+        """Go once, through so many parts or all; return the state that is meant at each step.
 
         The pedal is down until what it marks was said, which takes a movement. Nothing is returned
         where the machine stood still for so long that the device had the hand rest: go again.
         """
         first_m = self._corners_m[0]
-        corners = first_m + (self._corners_m - first_m) * rng.uniform(0.95, 1.05)
+        corners_m = self._corners_m[: None if parts is None else parts + 1]
+        corners = first_m + (corners_m - first_m) * rng.uniform(0.95, 1.05)
         sides_m = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         ends_s = np.cumsum(sides_m) / self._speed_m_s
         self._tell(corners[0], held=False)

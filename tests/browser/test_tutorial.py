@@ -201,8 +201,9 @@ def test_the_tutorial_leads_from_an_empty_folder_to_assistance(
     until_s = time.monotonic() + GUIDED_S
     while not guided(cell) >= set(STATES):
         # A machine that is busy with the page is late now and then, and the fixture gives way.
-        assert time.monotonic() < until_s, Counter(each.reason for each in cell.fixture)
-        clock.hand(lambda: hand.perform(rng, mark=False))
+        seen = Counter((each.reason, each.state) for each in cell.fixture)
+        assert time.monotonic() < until_s, seen
+        clock.hand(lambda: hand.perform(rng, mark=False, parts=len(STATES)))
     clock.lap("assisted")
     print("machine time:", ", ".join(clock.laps))
     viewer.keep_picture("tutorial-assisted")

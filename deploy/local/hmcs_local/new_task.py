@@ -129,9 +129,9 @@ def task_text(
     `setup` are the lines that name the robot.
     """
     gestemes = "\n".join(f"  - {{name: {state}}}" for state in states)
-    following = [*states[1:], None]
+    following = [*states[1:], states[0]]
     chain = "\n".join(
-        f"  - {{name: {state}, gestemes: [{state}], next: [{after or ''}]}}"
+        f"  - {{name: {state}, gestemes: [{state}], next: [{after}]}}"
         for state, after in zip(states, following, strict=True)
     )
     axes = ", ".join(plane or "xyz")
@@ -150,8 +150,9 @@ dead_zone_m: 0.008
 gestemes:
 {gestemes}
 
-# States are the parts of the task as you think of it. `next` lists what may follow, [] ends the
-# task; {{a: 0.8, b: 0.2}} gives probabilities.
+# States are the parts of the task as you think of it. `next` lists what may follow: the last one
+# leads back to the first, so that the task is done again and again; [] ends it, and whatever the
+# hand does then is no part of it. {{a: 0.8, b: 0.2}} gives probabilities.
 states:
 {chain}
 

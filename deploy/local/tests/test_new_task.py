@@ -27,7 +27,11 @@ def test_what_is_written_is_a_task_as_asked_for(tmp_path: Path, robot: str, plan
     assert (task.name, task.robot.model) == ("pick", robot)
     assert "".join(task.recognition.axes) == (plane or "xyz")
     follow = {state.name: dict(state.next) for state in task.states}
-    assert follow == {"approach": {"insert": 1.0}, "insert": {"retract": 1.0}, "retract": {}}
+    assert follow == {
+        "approach": {"insert": 1.0},
+        "insert": {"retract": 1.0},
+        "retract": {"approach": 1.0},
+    }
     assert dict(task.start) == {"approach": 1.0}
 
 

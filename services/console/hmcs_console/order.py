@@ -28,9 +28,11 @@ def order_of(task: Task) -> Order:
 def next_part(order: Order, now: str) -> str:
     """Return the state that most likely begins after `now`, the first one after none.
 
-    Empty after a state that none follows: there the task ends.
+    Empty after a state that none follows, or only the first one anew: there the task ends, and is
+    begun again by one more press.
     """
     if not now:
         return order.first
     follow = order.follow.get(now, {})
-    return max(follow, key=lambda state: follow[state], default="")
+    likeliest = max(follow, key=lambda state: follow[state], default="")
+    return "" if likeliest == order.first else likeliest

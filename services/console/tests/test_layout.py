@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from hmcs_console.drawing.layout import Layout, anchored, laid_out
@@ -78,8 +79,11 @@ def test_the_order_is_that_of_the_tasks_file() -> None:
     assert order.follow["turn-back"] == {"reach": 1.0}
 
 
-def test_each_press_begins_the_likeliest_part_that_follows_and_one_more_ends_the_task() -> None:
-    order = Order("take", {"take": {"bring": 0.8, "set": 0.2}, "bring": {"set": 1.0}, "set": {}})
+@pytest.mark.parametrize("after", [{}, {"take": 1.0}])
+def test_each_press_begins_the_likeliest_part_that_follows_and_one_more_ends_the_task(
+    after: dict[str, float],
+) -> None:
+    order = Order("take", {"take": {"bring": 0.8, "set": 0.2}, "bring": {"set": 1.0}, "set": after})
     marked, now = [], ""
     for _ in range(5):
         now = next_part(order, now)
