@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import viser
 
-from hmcs.bus.messages import Outline, OutlineQuestion, Segmentation, SegmentQuestion
+from hmcs.bus.messages import OutlineQuestion, Segmentation, SegmentQuestion
 from hmcs.bus.session import RequestRefusedError
 from hmcs.palette import state_color
 from hmcs.recordings.stretches import LabelError
@@ -20,26 +20,10 @@ from hmcs_console.seeing.takes import Take, opened
 from hmcs_console.teaching.parts import Parts, agreed, learned
 from hmcs_console.teaching.strips import strips, ticks
 from hmcs_console.telling.words import training
+from support.outlines import STATES, outline
 
-STATES = ("free", "in")
 MODEL = Shelved("first", "hash-first", "segment-filter", ("two.mcap",), "first")
 OTHER = Shelved("second", "hash-second", "lhmm", ("two.mcap",))
-
-
-def outline(**changed: Any) -> Outline:
-    """Ten seconds, labeled `free` up to 5 s."""
-    reported = {
-        "recordings": ("two.mcap", "one.mcap"),
-        "recording": "two.mcap",
-        "path": "/takes/two.mcap",
-        "duration_s": 10.0,
-        "time_s": np.linspace(0.0, 10.0, 101),
-        "position": np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 101),
-        "begin_s": np.array([0.0]),
-        "end_s": np.array([5.0]),
-        "states": ("free",),
-    }
-    return Outline(**(reported | changed))
 
 
 def said(**changed: Any) -> Segmentation:

@@ -29,24 +29,7 @@ from hmcs_console.seeing.takes import (
 )
 from hmcs_console.shapes.palette import UNKNOWN, color_of
 from hmcs_console.teaching.timeline import TakePath, Timeline
-
-STATES = ("free", "in")
-
-
-def outline(**changed: Any) -> Outline:
-    """Ten seconds along x, one meter in all, its first half labeled."""
-    reported = {
-        "recordings": ("two.mcap", "one.mcap"),
-        "recording": "two.mcap",
-        "path": "/takes/two.mcap",
-        "duration_s": 10.0,
-        "time_s": np.linspace(0.0, 10.0, 101),
-        "position": np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 101),
-        "begin_s": np.array([0.0]),
-        "end_s": np.array([5.0]),
-        "states": ("free",),
-    }
-    return Outline(**(reported | changed))
+from support.outlines import STATES, outline
 
 
 def take(**changed: Any) -> Take:

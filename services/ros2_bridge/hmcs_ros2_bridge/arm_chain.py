@@ -30,6 +30,6 @@ def chain_in(urdf: Urdf, settings: RosRobotSettings, robot: RobotSetup) -> Chain
     framed = settings.base_frame if settings.base_frame in urdf.links else None
     base_link = robot.base_link or framed
     chain = chain_of(urdf, tool_link, base_link, robot.tool_offset_m)
-    if settings.told_joints:
+    if settings.commands_joints:
         check_joints(urdf, chain, tool_link, base_link)
     return chain

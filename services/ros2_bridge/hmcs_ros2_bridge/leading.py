@@ -1,4 +1,4 @@
-"""What a ROS controller is told so that its arm follows a velocity of the tool.
+"""Messages for a ROS controller that have its arm follow a velocity of the tool.
 
 A TwistStamped leaves the joints to the controller. A JointTrajectory or joint velocities are made
 here of the arm's URDF: by damped least squares, with each joint within its range and its speed, as
@@ -43,7 +43,7 @@ MESSAGES: dict[CommandKind, str] = {
 
 
 class Led(NamedTuple):
-    """What the arm is told now."""
+    """A command to the arm: the twist it stands for, and the message."""
 
     twist: Array
     """The velocity its tool follows after all limits, m/s and rad/s, shape (6,)."""
@@ -75,13 +75,13 @@ class TwistLeading:
     def led(self, velocity: Array, arm: ArmReport, elapsed_s: float, stamp_ns: int) -> Led:
         """Return the velocity within the limits of the tool."""
         limited = admitted(velocity, arm.pose, self._before, self._limits, self._fence, elapsed_s)
-        return self._told(limited.twist, limited.names, stamp_ns)
+        return self._message(limited.twist, limited.names, stamp_ns)
 
     def standing(self, now_ns: int, stamp_ns: int) -> Led:
         """Return zeros."""
-        return self._told(np.zeros(6), (), stamp_ns)
+        return self._message(np.zeros(6), (), stamp_ns)
 
-    def _told(self, velocity: Array, names: tuple[str, ...], stamp_ns: int) -> Led:
+    def _message(self, velocity: Array, names: tuple[str, ...], stamp_ns: int) -> Led:
         self._before = velocity
         message = {"header": header(stamp_ns, self._frame), "twist": twist(velocity)}
         return Led(velocity, names, message)
@@ -189,7 +189,7 @@ class VelocitySpeech:
         return {"data": motion.velocities[self._order].tolist()}
 
     def held(self, reference: Array | None, stopped_for_ns: int) -> Fields | None:
-        """Return zeros, as often as asked: such a controller goes on as it was told last."""
+        """Return zeros, as often as asked: such a controller keeps its last velocities."""
         return {"data": [0.0] * len(self._order)}
 
 

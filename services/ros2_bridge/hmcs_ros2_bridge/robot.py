@@ -109,9 +109,7 @@ class RosRobot(Service):
         return True, f"standing: {self._supervision.stop}"
 
     def facts(self) -> dict[str, str]:
-        """Return which robot this is, and how long half of the commands wait at most until the arm
-        is told.
-        """
+        """Return which robot this is, and the median time from a command to its message."""
         waits_ns = median(self._waits_ns) if self._waits_ns else 0
         return {
             "commands_wait_ms": f"{waits_ns / 1e6:.3f}",

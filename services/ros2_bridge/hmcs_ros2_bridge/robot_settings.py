@@ -24,7 +24,7 @@ class RosRobotSettings(ServiceSettings):
     task: str = "human-shapes"
     """Name of a task that comes along, or path of a task file: workspace, regions, speed limits."""
     command: CommandKind = "twist"
-    """What the arm is told: `twist` (TwistStamped, for MoveIt Servo or a cartesian controller),
+    """The messages to the arm: `twist` (TwistStamped, for MoveIt Servo or a cartesian controller),
     `joint_trajectory` (JointTrajectory of one point) or `joint_velocity` (Float64MultiArray), for
     which the arm's URDF is needed."""
     command_topic: str = ""
@@ -34,8 +34,8 @@ class RosRobotSettings(ServiceSettings):
     """Of `joint_velocity`: the joints in the order of the controller; by default from the base
     on."""
     trajectory_s: float = Field(default=0.05, gt=0.0, le=1.0)
-    """Of `joint_trajectory`: each point is to be reached after so long. An arm that is told nothing
-    more stands after it."""
+    """Of `joint_trajectory`: each point is to be reached after so long. An arm that gets
+    no more of them stands after it."""
     tool_pose_from: Literal["topic", "joints", "tf"] | None = None
     """Where the tool is: from `tool_pose_topic`, from the joints and the URDF, or from /tf and
     /tf_static, for which ROS' tf2_msgs is needed. By default from the topic, and from the joints
@@ -82,18 +82,18 @@ class RosRobotSettings(ServiceSettings):
         return self.command_topic or COMMAND_TOPICS[self.command]
 
     @property
-    def told_joints(self) -> bool:
-        """Whether the arm is told where its joints go."""
+    def commands_joints(self) -> bool:
+        """Whether the arm is commanded by its joints."""
         return self.command != "twist"
 
     @property
     def pose_from(self) -> str:
         """Where the tool's pose comes from."""
-        return self.tool_pose_from or ("joints" if self.told_joints else "topic")
+        return self.tool_pose_from or ("joints" if self.commands_joints else "topic")
 
     @model_validator(mode="after")
     def _joints_are_known(self) -> Self:
-        if self.told_joints and self.pose_from != "joints":
+        if self.commands_joints and self.pose_from != "joints":
             raise ValueError(
                 f"tool_pose_from is {self.tool_pose_from!r}, and a command of the kind "
                 f"{self.command} needs joints: leave it out"

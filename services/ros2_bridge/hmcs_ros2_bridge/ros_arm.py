@@ -1,4 +1,4 @@
-"""The arm behind a ROS controller: what it says of itself, and what it is told."""
+"""The arm behind a ROS controller: its reports, and the commands to it."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ class RosArm:
             else ""
         )
         self._leading: Leading | None = (
-            None if settings.told_joints else TwistLeading(limits, fence, settings.base_frame)
+            None if settings.commands_joints else TwistLeading(limits, fence, settings.base_frame)
         )
         urdf = urdf_named(settings, task.robot) if by_joints else None
         if urdf is not None:
             self._learn(urdf)
         self.led = _SILENT
-        """What it was told last."""
+        """The last command."""
         self._led_ns = time.monotonic_ns()
         if settings.pose_from == "tf":
             check_transforms()
@@ -80,8 +80,10 @@ class RosArm:
             Topic(settings.commanded_topic, MESSAGES[settings.command], "reliable")
         )
 
-    def start(self, soon: Callable[[Callable[[], None]], None], told: Callable[[], None]) -> None:
-        """Listen from now on; `soon` has `told` done in the loop after reports of the tool."""
+    def start(
+        self, soon: Callable[[Callable[[], None]], None], on_report: Callable[[], None]
+    ) -> None:
+        """Listen from now on; `soon` has `on_report` done in the loop after reports of the tool."""
         settings, node = self._settings, self._node
 
         def report(take: Callable[[Any, int], bool], message: Any) -> None:
@@ -91,7 +93,7 @@ class RosArm:
 
         def handle() -> None:
             self.reports.handled()
-            told()
+            on_report()
 
         def description(message: Any) -> None:
             self.reports.take_description(message)
@@ -172,7 +174,7 @@ class RosArm:
     def _learn(self, urdf: Urdf) -> None:
         settings = self._settings
         chain = chain_in(urdf, settings, self._task.robot)
-        if settings.told_joints:
+        if settings.commands_joints:
             self._leading = joint_leading_of(settings, self._limits, self._fence, chain)
         self.reports.chain, self._no_chain = chain, ""
         if chain.assumed:

@@ -141,6 +141,16 @@ def load_model(path: str | Path, *, verify: Callable[[Path, bytes], None] | None
         raise ModelFileError(f"{source}: {what}: make one with `hmcs train`") from error
     if verify is not None:
         verify(source, content)
+    return model_in(content, source)
+
+
+def model_in(content: bytes, source: Path) -> Model:
+    """Return the model that the content of a model file holds; errors name it as `source`.
+
+    Raises ModelFileError as `load_model` does.
+    """
+    if len(content) > MOST_BYTES:
+        raise ModelFileError(f"{source}: larger than {MOST_BYTES:,} bytes, the most that is read")
     try:
         with Archive(content) as archive:
             fields = archive.manifest()

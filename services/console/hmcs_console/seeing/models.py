@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -18,7 +17,7 @@ from hmcs.errors import UserError
 from hmcs.fixtures.controller.rules import rules_of
 from hmcs.fixtures.guides.volumes import volume_radius_m
 from hmcs.recognition.model import Model
-from hmcs.recognition.model_file import load_model, model_files
+from hmcs.recognition.model_file import load_model, model_files, model_in
 from hmcs.shown import plain
 from hmcs.task import Task, load_task
 from hmcs_console.shapes.geometry import Surface, tube
@@ -162,14 +161,9 @@ class Models:
                         self._take(load_model(file))
 
     def _take_given(self, content: bytes) -> None:
-        # What came is none, or too large, whoever sent it: it is not drawn.
-        with (
-            suppress(UserError, OSError, ValueError, MemoryError, RecursionError),
-            tempfile.NamedTemporaryFile(suffix=".hmcs") as file,
-        ):
-            file.write(content)
-            file.flush()
-            self._take(load_model(file.name))
+        # What is no model, or too large, is not drawn.
+        with suppress(UserError, ValueError, MemoryError, RecursionError):
+            self._take(model_in(content, Path("a model that was sent")))
 
     def _take(self, model: Model) -> None:
         if len(self._hashed) < MOST_MODELS:

@@ -136,9 +136,9 @@ def _with_alike(
 ) -> dict[str, Array]:
     """Draw curves until l3, turned off l1 by `alike_rad`, still turns away from what it follows."""
     while True:
-        length_m = float(np.linalg.norm(curves["l3"][-1]) / np.linalg.norm(curves["l1"][-1]))
+        longer = float(np.linalg.norm(curves["l3"][-1]) / np.linalg.norm(curves["l1"][-1]))
         axis = _normal_of(curves["l1"], kinds["l1"].dimensions, rng)
-        turned = dict(curves) | {"l3": length_m * _turned(curves["l1"], alike_rad, axis)}
+        turned = curves | {"l3": longer * _turned(curves["l1"], alike_rad, axis)}
         if all(
             turn_rad(turned[a], turned[b]) >= kinds[b].least_turn_rad
             for order in orders

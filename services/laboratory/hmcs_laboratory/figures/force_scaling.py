@@ -16,6 +16,7 @@ from hmcs.fixtures.controller.softening import CompliancePolicy, Situation
 from hmcs.fixtures.law import Gains
 from hmcs.fixtures.parts import PreferredSubspace
 from hmcs.motion.closed_loop_operators import STEADY, ClosedLoopOperator
+from hmcs.motion.paths import Path
 from hmcs.task.fixture_parts import Cue, CueName, FixtureSetup, ScalingName
 from hmcs_laboratory.data.hands import Count, Positive
 from hmcs_laboratory.figures.compliance import OFF_PATH, meant_paths
@@ -75,11 +76,15 @@ def force_scaling(settings: ForceSettings, rng: np.random.Generator) -> Drawn:
     picture = new_picture(6.4)
     axes = picture.subplots(3, 3, sharex=True, sharey=True)
     seeds = [int(seed) for seed in rng.integers(2**32, size=settings.repeats)]
+    meant = meant_paths()[1]
+    leaves_m = _leaves_m(meant)
     numbers: dict[str, Number] = {"fade_mm": MM * settings.fade_m}
     for row, cue in zip(axes, CUES, strict=True):
         for ax, scaling in zip(row, SCALINGS, strict=True):
-            asked = Cue(cue=cue, scaling=scaling, fade_m=settings.fade_m)
-            all_left = [leave(asked, settings, seed) for seed in seeds]
+            asked = Cue(
+                cue=cue, scaling=scaling, fade_m=settings.fade_m, silence_s=settings.silence_s
+            )
+            all_left = [leave(meant, leaves_m, asked, settings.factor, seed) for seed in seeds]
             drawn = all_left[0]
             ax.plot(MM * drawn.errors, MM * drawn.forces, color=COLORS[0], linewidth=1.4)
             ax.axvline(MM * drawn.cued_at_m, color=INK, linewidth=0.9, linestyle=(0, (4, 3)))
@@ -106,17 +111,17 @@ def force_scaling(settings: ForceSettings, rng: np.random.Generator) -> Drawn:
     return Drawn(picture, numbers, _found(numbers, settings.repeats), _DIFFERS)
 
 
-def leave(cue: Cue, settings: ForceSettings, seed: int) -> Leaving:
+def leave(meant: Path, leaves_m: float, cue: Cue, stiff: float, seed: int) -> Leaving:
     """Return how an operator leaves the curve for a target beside it, led by the same fixture.
 
+    The way that is `meant` leaves the curve `leaves_m` along it; `stiff` is k before the cue.
     The pedal goes down as long after the operator means to leave as an eye and a hand take; for
     silence the hand rests there; the automatic cue is the product's own.
     """
-    meant = meant_paths()[1]
     operator = ClosedLoopOperator(STEADY, meant, np.random.default_rng(seed), period_s=_PERIOD_S)
-    rules = Rules(FixtureSetup(compliance="cue", cue=cue.model_copy(update=_silence(settings))))
-    policy, trusted = CompliancePolicy(), Trust("guiding", settings.factor)
-    leaves_m, target_m = (meant.project(point) for point in (_leaving_point(), OFF_PATH))
+    rules = Rules(FixtureSetup(compliance="cue", cue=cue))
+    policy, trusted = CompliancePolicy(), Trust("guiding", stiff)
+    target_m = meant.project(OFF_PATH)
     robot, rested_s, meant_for_s = meant.points[0].copy(), 0.0, 0.0
     errors, kept, delay_s = [], [], float("nan")
     for _ in range(int(_MOST_S / _PERIOD_S)):
@@ -126,7 +131,7 @@ def leave(cue: Cue, settings: ForceSettings, seed: int) -> Leaving:
         leaving, hand = motion.progress_m >= leaves_m, motion.velocity
         if leaving:
             meant_for_s += _PERIOD_S
-            if cue.cue == "silence" and rested_s < settings.silence_s + _PERIOD_S:
+            if cue.cue == "silence" and rested_s < cue.silence_s + _PERIOD_S:
                 rested_s, hand = rested_s + _PERIOD_S, np.zeros(3)
         near_m = CURVE.project(robot)
         error_m = float(np.linalg.norm(CURVE.at(near_m) - robot))
@@ -134,7 +139,7 @@ def leave(cue: Cue, settings: ForceSettings, seed: int) -> Leaving:
         pedal = meant_for_s > STEADY.delay_s
         now = Situation(hand, direction, error_m, near_m / CURVE.length_m, pedal)
         factor = policy.factor(trusted, rules, now, _PERIOD_S)
-        share = (factor - FREE_FACTOR) / (settings.factor - FREE_FACTOR)
+        share = (factor - FREE_FACTOR) / (stiff - FREE_FACTOR)
         if leaving:
             if share < 1.0 and np.isnan(delay_s):
                 delay_s = meant_for_s
@@ -145,15 +150,10 @@ def leave(cue: Cue, settings: ForceSettings, seed: int) -> Leaving:
     return Leaving(np.array(errors), np.array(kept), delay_s, meant_for_s)
 
 
-def _silence(settings: ForceSettings) -> dict[str, float]:
-    return {"silence_s": settings.silence_s}
-
-
-def _leaving_point() -> Array:
-    """Where the meant way leaves the curve: the last point that both share on the way there."""
-    points = meant_paths()[1].points
-    off = np.array([np.linalg.norm(CURVE.at(CURVE.project(p)) - p) for p in points])
-    return np.asarray(points[np.flatnonzero(off > 1e-4)[0] - 1])
+def _leaves_m(meant: Path) -> float:
+    """How far along it the meant way leaves the curve: at the last point that both share."""
+    off = np.array([np.linalg.norm(CURVE.at(CURVE.project(p)) - p) for p in meant.points])
+    return meant.project(meant.points[np.flatnonzero(off > 1e-4)[0] - 1])
 
 
 def _mean(values: Sequence[float]) -> float | None:

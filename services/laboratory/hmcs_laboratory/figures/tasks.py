@@ -102,14 +102,13 @@ def _drawn(
     more is true.
     """
     task, names = learned.task, names_of(learned)
+    other_confusions: Confusions = "training" if settings.confusions == "held-out" else "held-out"
     lhmm, eager, other = (
         learn(task, learned.demonstrations, chosen, recognizer="lhmm")
         for chosen in (
             settings.lhmm_settings(settings.any_state),
             settings.lhmm_settings(settings.eager_any_state),
-            settings.lhmm_settings(
-                settings.any_state, "training" if settings.confusions == "held-out" else "held-out"
-            ),
+            settings.lhmm_settings(settings.any_state, other_confusions),
         )
     )
     filtering = learn(task, learned.demonstrations)
@@ -138,21 +137,26 @@ def _drawn(
     changes = np.flatnonzero(np.diff(shown.performances[typical].states)) + 1
     own_scores = {name: own[typical] for name, own in scores.items()}
     picture = draw_panels(names, followed[typical], believed[typical], truth, changes, own_scores)
+    winners_right = _winners_right(followed, shown, names)
     numbers: dict[str, Number] = {
         "steps": len(truth),
         "performances": len(shown.performances),
         "changes_at": changes.tolist(),
         **_level_numbers(followed[typical], truth),
-        "all_winning_gesteme_right": _winners_right(followed, shown, names),
+        "all_winning_gesteme_right": winners_right,
     }
     for name, own in scores.items():
         numbers |= _scored(name, own[typical]) | _scored(f"all_{name}", pooled(own))
     what = "gestemes" if by_gesteme else "states"
     drawn = _found(followed[typical], truth, typical, scores, what)
+    accuracies = {
+        settings.confusions: pooled(scores["lhmm"]).accuracy,
+        other_confusions: pooled(scores["other_confusions_lhmm"]).accuracy,
+    }
     return Drawn(
         picture,
         numbers,
-        f"{drawn} {_headline(numbers, settings, what)}",
+        f"{drawn} {_headline(winners_right, accuracies, what)}",
         _differs(settings, followed[typical], truth, scores, by_gesteme=by_gesteme),
     )
 
@@ -166,19 +170,14 @@ def _winners_right(followed: Sequence[Followed], shown: TaskSet, names: Names) -
     return float(np.concatenate(right).mean())
 
 
-def _headline(numbers: Mapping[str, Number], settings: LayeredHmmFigureSettings, what: str) -> str:
-    """What the task level makes of a gesteme level that errs."""
-    own, other = "all_lhmm_accuracy", "all_other_confusions_lhmm_accuracy"
-    if settings.confusions == "training":
-        own, other = other, own
-    winners, held_out, training = (
-        100.0 * float(str(numbers[name])) for name in ("all_winning_gesteme_right", own, other)
-    )
+def _headline(winners_right: float, accuracies: Mapping[Confusions, float], what: str) -> str:
+    """What the task level makes of a gesteme level that errs, however it learned of that."""
+    held_out, training = accuracies["held-out"], accuracies["training"]
     return (
-        f"In all performances the winning gesteme was right in {winners:.1f} % of the steps. The "
-        f"task level had {held_out:.1f} % of {what} right where it had learned the confusions from "
-        "demonstrations that the gesteme HMMs had not seen, and "
-        f"{training:.1f} % where, as in the thesis, from those they were learned from."
+        f"In all performances the winning gesteme was right in {100 * winners_right:.1f} % of the "
+        f"steps. The task level had {100 * held_out:.1f} % of {what} right where it had learned "
+        "the confusions from demonstrations that the gesteme HMMs had not seen, and "
+        f"{100 * training:.1f} % where, as in the thesis, from those they were learned from."
     )
 
 
